@@ -1,0 +1,60 @@
+#define _GNU_SOURCE
+#include "host/base/output.h"
+
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+char *qp_output_temporary(const char *path) {
+    const char *slash = strrchr(path, '/');
+    const char *name = slash != NULL ? slash + 1 : path;
+    size_t size = strlen(path) + 40;
+    char *text = qp_alloc(size, 1, false);
+    /* The process id keeps two runs apart; the extension stays last, as image writers choose by it. */
+    if (text != NULL) snprintf(text, size, "%.*s.%ld~%s", (int)(name - path), path, (long)getpid(), name);
+    return text;
+}
+
+static void output_free(qp_output *output) {
+    free(output->path);
+    free(output->temporary);
+    *output = (qp_output){0};
+}
+
+qp_status qp_output_open(qp_output *output, const char *path, qp_error *err) {
+    *output = (qp_output){.path = strdup(path), .temporary = qp_output_temporary(path)};
+    if (output->path == NULL || output->temporary == NULL) {
+        output_free(output);
+        return qp_fail_memory(err, strlen(path), "a file name");
+    }
+    output->file = fopen(output->temporary, "wb");
+    if (output->file == NULL) {
+        int reason = errno;
+        output_free(output);
+        return qp_fail(err, QP_SYSTEM, "%s: cannot be written: %s", path, strerror(reason));
+    }
+    return QP_OK;
+}
+
+qp_status qp_output_commit(qp_output *output, qp_error *err) {
+    errno = 0;
+    bool good = ferror(output->file) == 0;
+    good = fclose(output->file) == 0 && good;
+    good = good && rename(output->temporary, output->path) == 0;
+    qp_status status = QP_OK;
+    if (!good) {
+        const char *reason = errno != 0 ? strerror(errno) : "write error";
+        status = qp_fail(err, QP_SYSTEM, "%s: cannot be written: %s", output->path, reason);
+        unlink(output->temporary);
+    }
+    output_free(output);
+    return status;
+}
+
+void qp_output_abandon(qp_output *output) {
+    if (output->file == NULL) return;
+    fclose(output->file);
+    unlink(output->temporary);
+    output_free(output);
+}

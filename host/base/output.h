@@ -1,0 +1,25 @@
+/* Files that appear whole or not at all: written beside their place, then renamed into it. */
+#ifndef QP_BASE_OUTPUT_H
+#define QP_BASE_OUTPUT_H
+
+#include "host/base/status.h"
+
+#include <stdio.h>
+
+typedef struct qp_output {
+    FILE *file;
+    char *path, *temporary; /* temporary: in the same folder, with the same extension */
+} qp_output;
+
+/* A name beside path, of the same extension, for what cannot write through a FILE; free() it. NULL when
+ * memory is out. */
+char *qp_output_temporary(const char *path);
+
+/* Opens the temporary file. QP_SYSTEM, naming path, when it cannot be made. */
+qp_status qp_output_open(qp_output *output, const char *path, qp_error *err);
+/* Closes it and renames it into place; on failure (a full disk) nothing is left behind. Frees *output. */
+qp_status qp_output_commit(qp_output *output, qp_error *err);
+/* Removes the temporary file instead. Frees *output. */
+void qp_output_abandon(qp_output *output);
+
+#endif
