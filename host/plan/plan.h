@@ -1,0 +1,42 @@
+/* Plans and surfaces as the other host parts read them. Node and row layout: kernels/plan_layout.h. */
+#ifndef QP_PLAN_PLAN_H
+#define QP_PLAN_PLAN_H
+
+#include "host/mesh/mesh.h"
+#include "kernels/plan_layout.h"
+
+/* One plan; immutable once built. */
+typedef struct qp_plan {
+    uint32_t ring_size, point_count, tree_words, constant_count, node_count;
+    uint32_t flags;           /* QP_PLAN_* */
+    uint32_t rows[QP_LEVELS]; /* points needed at level <= n */
+    uint32_t *tree;           /* [tree_words], root at 0 */
+    double *weights;          /* [point_count * ring_size], row-major: a row is one stencil */
+    double *constants; /* [constant_count]; a CREASE node's word 10 is index + point_count * ring_size */
+} qp_plan;
+
+struct qp_surface {
+    const qp_mesh *mesh;
+    qp_surface_options options;
+    uint32_t n_plans;
+    qp_plan **plans;         /* [n_plans] */
+    uint32_t regular_plan;   /* index of the regular plan or QP_NONE */
+    uint32_t *patch_plan;    /* [mesh->n_patches] plan, or QP_NONE where the patch has no surface (holes) */
+    uint8_t *patch_rotation; /* [n_patches] 0..3 */
+    uint64_t *patch_ring;    /* [n_patches] first entry in rings */
+    uint32_t *rings;         /* base vertices of each patch's 1-ring in its plan's order */
+    uint64_t ring_entries;
+    double build_ms;
+};
+
+/* All plans concatenated as plan_layout.h says; caller frees the three arrays with free(). */
+typedef struct qp_plan_pack {
+    uint32_t *heads;
+    uint32_t *tree;
+    void *reals; /* float or double */
+    size_t head_words, tree_words, real_count;
+} qp_plan_pack;
+qp_status qp_surface_pack(const qp_surface *surface, qp_precision precision, qp_plan_pack *pack,
+                          qp_error *err);
+
+#endif

@@ -1,0 +1,52 @@
+/* The exact limit surface, by recursive refinement around (u,v) in __float128, written independently of
+ * host/plan. */
+#ifndef QP_REFERENCE_REFERENCE_H
+#define QP_REFERENCE_REFERENCE_H
+
+#include "host/mesh/mesh.h"
+
+typedef struct qp_reference_sample {
+    double p[3], du[3], dv[3]; /* du, dv with respect to the patch's own (u,v) in [0,1]^2 */
+    double n[3];               /* unit normal, or 0 where undefined */
+    bool normal_defined; /* false where the surface has no tangent plane, or it is too ill-conditioned to tell
+                          */
+} qp_reference_sample;
+
+/* Limit position, derivatives and normal of one patch at count points uv[2*i], uv[2*i+1] in [0,1]; exact at
+ * any of them, corners of extraordinary vertices included. Thread-safe: reads the mesh only. positions: 3 a
+ * vertex, usually mesh->positions (or their float-rounded values, so that float evaluation is measured
+ * against what it was given). */
+qp_status qp_reference_eval(const qp_mesh *mesh, const double *positions, uint32_t patch, size_t count,
+                            const double *uv, qp_reference_sample *samples, qp_error *err);
+
+/* Error measures of DESIGN.md, "Measuring". */
+typedef struct qp_error_report {
+    uint64_t samples, past_depth, normals_undefined, nonfinite;
+    double position_max, position_rms; /* of the bounding box diagonal */
+    double normal_max_deg, normal_rms_deg;
+    uint32_t worst_patch;
+    float worst_u, worst_v; /* of position_max */
+    uint32_t worst_normal_patch;
+    float worst_normal_u, worst_normal_v;
+    double past_position_max; /* of the samples past depth, which the maxima above leave out */
+    double past_normal_max_deg;
+} qp_error_report;
+
+/* Compares a vertex stream with the reference, in parallel over patches. Samples flagged QP_SAMPLE_PAST_DEPTH
+ * are counted apart. */
+qp_status qp_reference_compare(const qp_mesh *mesh, const qp_stream *stream, qp_error_report *report,
+                               qp_error *err);
+
+/* Sample sets. Arrays are malloced for the caller. kind "corner": (u,v) in {0, 2^-k} offsets about every
+ * corner of every patch, k = 1..24; "random": count low-discrepancy points over all patches with a surface,
+ * multiples of 2^-24. */
+typedef struct qp_sample_set {
+    uint64_t count;
+    uint32_t *patch;
+    float *uv;
+} qp_sample_set;
+qp_status qp_sample_set_make(const qp_mesh *mesh, const char *kind, uint64_t count, uint64_t seed,
+                             qp_sample_set *set, qp_error *err);
+void qp_sample_set_free(qp_sample_set *set);
+
+#endif

@@ -1,0 +1,225 @@
+/* quadplan: exact evaluation of Catmull-Clark subdivision surfaces by adaptive quadtrees.
+ *
+ * The method is that of Brainerd, Foley, Kraemer, Moreton and Niessner, "Efficient GPU Rendering of
+ * Subdivision Surfaces Using Adaptive Quadtrees" (ACM TOG 35(4), SIGGRAPH 2016); section numbers below are
+ * that paper's.
+ *
+ * How a program uses it:
+ *   qp_mesh_read_obj / qp_mesh_create   a base mesh, with tags, checked and analysed
+ *   qp_surface_create                   its patches and their subdivision plans
+ *   qp_device_open                      an OpenCL device, or the host itself
+ *   qp_frame_create, qp_frame_eval      the vertex stream for given tessellation factors
+ *
+ * Conventions: every function that can fail returns a qp_status and, on failure, fills *err (which may be
+ * NULL) with one line of text. Handles are owned by the caller and freed by the matching _free, which accepts
+ * NULL. Right-handed coordinates in the units of the mesh; faces counter-clockwise seen from outside. A
+ * handle may be used by one thread at a time; different handles are independent. */
+#ifndef QUADPLAN_H
+#define QUADPLAN_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#if defined(__GNUC__)
+#define QP_API __attribute__((visibility("default")))
+#else
+#define QP_API
+#endif
+
+#define QP_VERSION_MAJOR 0
+#define QP_VERSION_MINOR 1
+#define QP_VERSION_PATCH 0
+
+/* Also the exit codes of the program. */
+typedef enum qp_status {
+    QP_OK = 0,
+    QP_CHECK_FAILED = 1, /* a comparison did not hold */
+    QP_BAD_INPUT = 2,    /* usage, file content, or an argument out of range */
+    QP_SYSTEM = 3        /* memory, files that cannot be written, OpenCL, GL */
+} qp_status;
+
+typedef struct qp_error {
+    qp_status status;
+    char message[480]; /* one line, without a newline */
+} qp_error;
+
+/* ---- Base mesh -------------------------------------------------------------------------------------------
+ */
+
+/* Sharpness at or above this is infinite (OpenSubdiv's constant). */
+#define QP_SHARPNESS_INFINITE 10.0f
+/* "no element" in every index array. */
+#define QP_NONE UINT32_MAX
+
+typedef enum qp_boundary { /* numbered as OpenSubdiv's interpolateboundary tag */
+                           QP_BOUNDARY_NONE = 0,
+                           QP_BOUNDARY_EDGE_AND_CORNER = 1,
+                           QP_BOUNDARY_EDGE_ONLY = 2
+} qp_boundary;
+typedef enum qp_crease_method { QP_CREASE_UNIFORM = 0, QP_CREASE_CHAIKIN = 1 } qp_crease_method;
+typedef enum qp_triangle_rule { QP_TRIANGLE_CATMARK = 0, QP_TRIANGLE_SMOOTH = 1 } qp_triangle_rule;
+
+/* Zero-initialise for "as the file says, else the defaults" (edge-only, uniform, catmark). */
+typedef struct qp_mesh_options {
+    int override_boundary; /* 1: use .boundary whatever the file says; likewise below */
+    qp_boundary boundary;
+    int override_crease_method;
+    qp_crease_method crease_method;
+    int override_triangle_rule;
+    qp_triangle_rule triangle_rule;
+    /* Called once per warning with one line of text; NULL: warnings are dropped. */
+    void (*warn)(void *context, const char *line);
+    void *warn_context;
+} qp_mesh_options;
+
+typedef struct qp_mesh qp_mesh;
+
+/* Reads a Wavefront OBJ file with OpenSubdiv's tag lines ("t crease 2/1/0 a b s" ...).
+ * Refuses with QP_BAD_INPUT, naming file and line, what is not a mesh. */
+QP_API qp_status qp_mesh_read_obj(const char *path, const qp_mesh_options *options, qp_mesh **mesh,
+                                  qp_error *err);
+
+/* The same from memory; name is what messages call it. text need not end in a NUL. */
+QP_API qp_status qp_mesh_parse_obj(const char *name, const char *text, size_t length,
+                                   const qp_mesh_options *options, qp_mesh **mesh, qp_error *err);
+
+/* Topology and tags as arrays; all are copied. Vertices of face f are face_vertices[sum of face_sizes before
+ * f ...]. */
+typedef struct qp_mesh_desc {
+    uint32_t n_vertices, n_faces;
+    const double *positions;       /* 3 a vertex */
+    const uint32_t *face_sizes;    /* n_faces */
+    const uint32_t *face_vertices; /* sum of face_sizes, counter-clockwise */
+    uint32_t n_creases;
+    const uint32_t *crease_vertices; /* 2 a crease: the edge's end points */
+    const float *crease_sharpness;
+    uint32_t n_corners;
+    const uint32_t *corner_vertices;
+    const float *corner_sharpness;
+    uint32_t n_holes;
+    const uint32_t *hole_faces;
+    qp_boundary boundary;
+    qp_crease_method crease_method;
+    qp_triangle_rule triangle_rule;
+} qp_mesh_desc;
+QP_API qp_status qp_mesh_create(const qp_mesh_desc *desc, qp_mesh **mesh, qp_error *err);
+
+QP_API void qp_mesh_free(qp_mesh *mesh);
+QP_API uint32_t qp_mesh_vertex_count(const qp_mesh *mesh);
+QP_API uint32_t qp_mesh_face_count(const qp_mesh *mesh);
+/* Patches in ptex order: one for a quad, n for an n-gon; faces that are holes included. */
+QP_API uint32_t qp_mesh_patch_count(const qp_mesh *mesh);
+/* 3 doubles a vertex, owned by the mesh. */
+QP_API const double *qp_mesh_positions(const qp_mesh *mesh);
+
+/* ---- Surfaces: patches and their subdivision plans
+ * --------------------------------------------------------- */
+
+/* Zero-initialise for the defaults. */
+typedef struct qp_surface_options {
+    uint32_t depth; /* deepest subdivision level a plan stores, 1..12; 0: 10. The paper's is 6 (factor 64). */
+    int no_crease_nodes;   /* subdivide along single semi-sharp creases instead (for comparison) */
+    int no_terminal_nodes; /* internal nodes instead of terminal ones (for comparison) */
+} qp_surface_options;
+
+typedef struct qp_surface qp_surface;
+
+/* Builds the plan of every configuration in the mesh, in parallel. The surface keeps a pointer to the mesh,
+ * which must outlive it, and reads topology and tags only: positions are read when a frame is evaluated. */
+QP_API qp_status qp_surface_create(const qp_mesh *mesh, const qp_surface_options *options,
+                                   qp_surface **surface, qp_error *err);
+QP_API void qp_surface_free(qp_surface *surface);
+
+#define QP_INFO_LEVELS 7
+typedef struct qp_surface_info {
+    uint64_t vertices, faces, patches, regular_faces, irregular_faces, irregular_patches;
+    uint64_t plans;    /* the regular one counts as one when it is used */
+    uint64_t nodes;    /* quadtree nodes over all plans */
+    uint64_t stencils; /* stencil rows over all plans */
+    uint64_t quadtree_bytes, stencil_bytes;
+    uint64_t control_points[QP_INFO_LEVELS]; /* per level 0..6: padded to 4 a patch, summed over irregular
+                                                patches */
+    uint64_t unique_control_points[QP_INFO_LEVELS]; /* de-duplicated over the mesh */
+    uint64_t scratch_bytes; /* worst-case scratch at the deepest level, 16 bytes a point */
+    double build_ms;        /* building of plans, wall clock */
+} qp_surface_info;
+QP_API qp_status qp_surface_get_info(const qp_surface *surface, qp_surface_info *info, qp_error *err);
+
+/* ---- Devices
+ * ------------------------------------------------------------------------------------------------ */
+
+typedef enum qp_precision { QP_FLOAT = 0, QP_DOUBLE = 1 } qp_precision;
+
+typedef struct qp_device qp_device;
+
+/* which: NULL or "" for the first OpenCL device (environment variable QUADPLAN_DEVICE overrides), "host" for
+ * the kernels compiled as C into the library, a number "P.D" (platform.device), or part of a device's name.
+ */
+QP_API qp_status qp_device_open(const char *which, qp_device **device, qp_error *err);
+QP_API void qp_device_free(qp_device *device);
+/* Name, owned by the device. */
+QP_API const char *qp_device_name(const qp_device *device);
+QP_API int qp_device_has_double(const qp_device *device);
+
+/* ---- Frames
+ * ------------------------------------------------------------------------------------------------- */
+
+typedef enum qp_spacing { QP_EQUAL = 0, QP_FRACTIONAL_EVEN = 1, QP_FRACTIONAL_ODD = 2 } qp_spacing;
+
+typedef struct qp_tessellation {
+    qp_spacing spacing;
+    float factor; /* uniform factor, 1 to 64, used when patch_factors is NULL */
+    /* 6 a patch in ptex order: the GL quad domain's outer levels 0..3 (edges u=0, v=0, u=1, v=1), then the
+     * inner levels (u, v). A factor <= 0 or NaN discards the patch, as GL does. */
+    const float *patch_factors;
+} qp_tessellation;
+
+enum {
+    QP_SAMPLE_PAST_DEPTH = 1, /* (u,v) lies below the plan's last level: an approximation was returned */
+    QP_SAMPLE_NO_NORMAL = 2   /* no tangent plane there: the normal is a fallback, (0,0,0) */
+};
+
+/* What an evaluation made. All arrays belong to the frame and live until its next evaluation or its end. */
+typedef struct qp_stream {
+    qp_precision precision;
+    uint64_t n_samples;
+    const void *vertices; /* 6 float or double a sample: position, unit normal (right-handed, du x dv) */
+    const uint8_t *flags; /* n_samples, QP_SAMPLE_* */
+    const float *uv;      /* 2 a sample */
+    const uint32_t *sample_patch; /* n_samples */
+    uint64_t n_triangles;
+    const uint32_t *triangles; /* 3 sample indices a triangle, counter-clockwise; NULL unless asked for */
+    double hull_ms, domain_ms, frame_ms; /* of this evaluation; frame_ms is the whole without set-up */
+    uint64_t support_bytes;              /* control points held */
+    uint64_t hash;                       /* of the bytes of vertices; 0 unless asked for */
+} qp_stream;
+
+typedef struct qp_frame_options {
+    qp_precision precision;
+    int want_triangles, want_hash;
+    int no_regular_pass; /* evaluate regular patches through the general kernels too (for comparison) */
+} qp_frame_options;
+
+typedef struct qp_frame qp_frame;
+/* Uploads plans and positions and builds the kernels that this surface needs. Both handles must outlive the
+ * frame. */
+QP_API qp_status qp_frame_create(qp_device *device, const qp_surface *surface,
+                                 const qp_frame_options *options, qp_frame **frame, qp_error *err);
+QP_API void qp_frame_free(qp_frame *frame);
+/* Reads the mesh's positions anew (after they were changed in place). */
+QP_API qp_status qp_frame_update_positions(qp_frame *frame, qp_error *err);
+/* The vertex stream at the tessellator's points. */
+QP_API qp_status qp_frame_eval(qp_frame *frame, const qp_tessellation *tessellation, qp_stream *stream,
+                               qp_error *err);
+/* The same at any points, in the order given: patch[i], uv[2 * i]. uv are multiples of 2^-24 in [0, 1]. */
+QP_API qp_status qp_frame_eval_points(qp_frame *frame, uint64_t count, const uint32_t *patch, const float *uv,
+                                      qp_stream *stream, qp_error *err);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

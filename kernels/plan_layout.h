@@ -1,0 +1,84 @@
+/* How a subdivision plan lies in memory: shared by the host that packs it and the kernels that read it.
+ * Plain macros and unsigned words only, so that C11 and OpenCL C 1.2 both read it.
+ *
+ * All plans of a surface are concatenated into three arrays:
+ *   heads    QP_HEAD_WORDS words a plan (see below)
+ *   tree     32-bit words: quadtree nodes; a plan's offsets are relative to its head's QP_HEAD_TREE
+ *   reals    float or double: stencil weights and crease constants; relative to QP_HEAD_REALS
+ *
+ * A plan maps the vertices of a patch's 1-ring (ring_size N of them, in canonical order) to `points` P
+ * control points. Stencil weights come first in reals, transposed: weight of ring vertex j for point i is
+ * reals[j * P + i], so that neighbouring work-items (points) read neighbouring weights. Points are sorted by
+ * the first level that needs them: a frame at level n computes points [0, rows[n]).
+ *
+ * Everything is relative to the patch origin, the position of ring vertex 0: the hull subtracts it from every
+ * ring position first (exact or correctly rounded once), the domain stage adds it last. Weights of a row sum
+ * to 1, or to 0 for tangents and for *offset* rows: the points of a terminal node are stored as offsets from
+ * the limit position of its corner (point ORIGIN), so that they keep full relative precision however deep
+ * they lie.
+ *
+ * (u,v) of a plan: patches that share a plan by rotation r (0..3) put the plan's corner 0 at their own corner
+ * r: r=0: (u,v); r=1: (v,1-u); r=2: (1-u,1-v); r=3: (1-v,u) are the plan's (u,v) of the patch's (u,v). */
+#ifndef QP_PLAN_LAYOUT_H
+#define QP_PLAN_LAYOUT_H
+
+#define QP_LEVELS 16u /* rows[] entries; the last one is all rows */
+
+/* Head words. */
+#define QP_HEAD_RING 0u   /* N */
+#define QP_HEAD_POINTS 1u /* P */
+#define QP_HEAD_TREE 2u   /* first word in tree; the root node is there */
+#define QP_HEAD_REALS 3u  /* first element in reals */
+#define QP_HEAD_FLAGS 4u  /* QP_PLAN_* */
+#define QP_HEAD_ROWS 5u   /* rows[QP_LEVELS] */
+#define QP_HEAD_WORDS (QP_HEAD_ROWS + QP_LEVELS)
+
+#define QP_PLAN_REGULAR 1u  /* the one plan whose points are its 16 ring vertices, row-major from (-1,-1) */
+#define QP_PLAN_CREASE 2u   /* has crease nodes */
+#define QP_PLAN_TERMINAL 4u /* has terminal nodes */
+#define QP_PLAN_INTERNAL 8u /* has internal nodes */
+#define QP_PLAN_CORNERS 16u /* has extraordinary or irregular leaves */
+
+/* Word 0 of a node: kind in bits 0..2, rotation in bits 3..4 (crease, terminal), tie_u in bit 5, tie_v in bit
+ * 6 (internal), count of ring levels in bits 8..15 (terminal). Node-local (u,v) runs over [0,1]^2 in every
+ * node; going down doubles it (exactly). Rotation r turns the node's (u,v) as the patch rotation above does,
+ * so that the crease edge is v=0 / the extraordinary corner is (0,0). Point indices are 16 bits, two a word,
+ * low half first.
+ *
+ * REGULAR        word 1: origin point or QP_NO_POINT. words 2..9: 16 points, row-major (v outer, u inner) of
+ * the uniform bicubic B-spline whose domain is the node. CREASE         word 1: origin or QP_NO_POINT.
+ * words 2..9: as REGULAR, in the rotated frame (crease along v=0). word 10: offset of QP_CREASE_REALS
+ * constants in reals (relative to QP_HEAD_REALS): [0] v0, [1] v1: zone 0 is v >= v0, zone 1 is v1 <= v < v0,
+ * zone 2 is v < v1; [2..4] scale of each zone; then three 4x4 matrices M (row-major). In zone z the weights
+ * of the four rows of points are  w[j] = sum_i B_i(v * scale_z) * M_z[i][j], B the cubic B-spline basis (and
+ *                derivative: d/dv = scale_z * B').
+ * INTERNAL       words 1..4: nodes of the children (u<.5,v<.5), (u>=.5,v<.5), (u<.5,v>=.5), (u>=.5,v>=.5).
+ *                At exactly .5 the child is the upper one, or the lower one where tie_u / tie_v is set.
+ * TERMINAL       word 1: origin point (offset rows, see above) or QP_NO_POINT. word 2: node of the remaining
+ * corner cell. Then 12 words a ring level: 24 points of the 5x5 grid row-major (v outer) without (0,0): slot
+ * of (i,j) is 5*j+i-1. At each ring level: if u >= .5 or v >= .5 the sample lies in one of three regular
+ *                sub-domains, with cx = u>=.5, cy = v>=.5 its 16 points are (cx+a, cy+b), a,b in 0..3, its
+ *                (u,v) is 2u-cx, 2v-cy; else (u,v) doubles and the next ring level follows, or at last word
+ * 2's node. EXTRAORDINARY  follows a TERMINAL only, in its rotated frame. words 1..3: limit position, first
+ * and second tangent points (cross(t1,t2) points along the normal; QP_NO_POINT tangents: no tangent plane).
+ * Exact at (0,0); elsewhere the sample is past the plan's depth: radial blend between the limit point and the
+ * terminal's last ring. IRREGULAR      words 1..6: 12 points: limit position, t1, t2 of the corners (0,0),
+ * (1,0), (1,1), (0,1), QP_NO_POINT where a tangent is undefined. Exact at the corners; elsewhere past depth:
+ * bilinear blend. */
+#define QP_NODE_INTERNAL 0u
+#define QP_NODE_REGULAR 1u
+#define QP_NODE_CREASE 2u
+#define QP_NODE_TERMINAL 3u
+#define QP_NODE_EXTRAORDINARY 4u
+#define QP_NODE_IRREGULAR 5u
+
+#define QP_NODE_KIND(w) ((w)&7u)
+#define QP_NODE_ROTATION(w) (((w) >> 3) & 3u)
+#define QP_NODE_TIE_U(w) (((w) >> 5) & 1u)
+#define QP_NODE_TIE_V(w) (((w) >> 6) & 1u)
+#define QP_NODE_RINGS(w) (((w) >> 8) & 255u)
+
+#define QP_NO_POINT 0xffffu
+#define QP_CREASE_REALS 53u
+
+#endif
