@@ -4,6 +4,7 @@
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 char *qp_output_temporary(const char *path) {
@@ -22,13 +23,23 @@ static void output_free(qp_output *output) {
     *output = (qp_output){0};
 }
 
+/* A device or a pipe is written as it is: renaming would put a file in its place. */
+static bool written_in_place(const char *path) {
+    struct stat about;
+    return stat(path, &about) == 0 && !S_ISREG(about.st_mode);
+}
+
 qp_status qp_output_open(qp_output *output, const char *path, qp_error *err) {
     *output = (qp_output){.path = strdup(path), .temporary = qp_output_temporary(path)};
     if (output->path == NULL || output->temporary == NULL) {
         output_free(output);
         return qp_fail_memory(err, strlen(path), "a file name");
     }
-    output->file = fopen(output->temporary, "wb");
+    if (written_in_place(path)) {
+        free(output->temporary);
+        output->temporary = NULL;
+    }
+    output->file = fopen(output->temporary != NULL ? output->temporary : path, "wb");
     if (output->file == NULL) {
         int reason = errno;
         output_free(output);
@@ -41,12 +52,12 @@ qp_status qp_output_commit(qp_output *output, qp_error *err) {
     errno = 0;
     bool good = ferror(output->file) == 0;
     good = fclose(output->file) == 0 && good;
-    good = good && rename(output->temporary, output->path) == 0;
+    if (output->temporary != NULL) good = good && rename(output->temporary, output->path) == 0;
     qp_status status = QP_OK;
     if (!good) {
         const char *reason = errno != 0 ? strerror(errno) : "write error";
         status = qp_fail(err, QP_SYSTEM, "%s: cannot be written: %s", output->path, reason);
-        unlink(output->temporary);
+        if (output->temporary != NULL) unlink(output->temporary);
     }
     output_free(output);
     return status;
@@ -55,6 +66,6 @@ qp_status qp_output_commit(qp_output *output, qp_error *err) {
 void qp_output_abandon(qp_output *output) {
     if (output->file == NULL) return;
     fclose(output->file);
-    unlink(output->temporary);
+    if (output->temporary != NULL) unlink(output->temporary);
     output_free(output);
 }

@@ -1,4 +1,5 @@
-/* Files that appear whole or not at all: written beside their place, then renamed into it. */
+/* Files that appear whole or not at all: written beside their place, then renamed into it (but a device or a
+ * pipe is written as it is). */
 #ifndef QP_BASE_OUTPUT_H
 #define QP_BASE_OUTPUT_H
 
@@ -8,7 +9,8 @@
 
 typedef struct qp_output {
     FILE *file;
-    char *path, *temporary; /* temporary: in the same folder, with the same extension */
+    char *path;
+    char *temporary; /* in the same folder, with the same extension; NULL when written in place */
 } qp_output;
 
 /* A name beside path, of the same extension, for what cannot write through a FILE; free() it. NULL when
