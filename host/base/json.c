@@ -1,8 +1,8 @@
 #include "host/base/json.h"
+#include "host/base/number.h"
 
 #include <inttypes.h>
 #include <math.h>
-#include <stdlib.h>
 
 /* Length of the UTF-8 sequence at s, or 0 if it is not one (overlong forms and surrogates included). */
 static int utf8_length(const unsigned char *s) {
@@ -100,11 +100,8 @@ void qp_json_real(qp_json *json, const char *key, double value) {
         fputs("null", json->file);
         return;
     }
-    char text[40];
-    for (int digits = 6; digits <= 17; ++digits) {
-        snprintf(text, sizeof text, "%.*g", digits, value);
-        if (strtod(text, NULL) == value) break;
-    }
+    char text[QP_NUMBER_CHARS];
+    qp_write_double(text, value);
     fputs(text, json->file);
 }
 

@@ -1,0 +1,147 @@
+/* quadplan eval: the vertex stream, to a file and timed. */
+#include "host/cli/evaluation.h"
+
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MOST_REPEATS = 1000 };
+
+/* Milliseconds of each repetition. */
+typedef struct timings {
+    uint64_t count;
+    double hull[MOST_REPEATS], domain[MOST_REPEATS], frame[MOST_REPEATS], fill[MOST_REPEATS];
+    uint64_t peak_support_bytes;
+} timings;
+
+static int compare_doubles(const void *a, const void *b) {
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static double median(const double *values, uint64_t count) {
+    double sorted[MOST_REPEATS];
+    memcpy(sorted, values, count * sizeof *values);
+    qsort(sorted, count, sizeof *sorted, compare_doubles);
+    return count % 2 == 1 ? sorted[count / 2] : 0.5 * (sorted[count / 2 - 1] + sorted[count / 2]);
+}
+
+static void fill_part(void *context, size_t begin, size_t end, unsigned worker) {
+    memset((unsigned char *)context + begin, (int)(worker & 255), end - begin);
+}
+
+/* Evaluates `repeats` times, each beside a memset of as many bytes on all cores. The stream is the last one.
+ */
+static qp_status measure(const cli_evaluation *evaluation, const qp_tessellation *tessellation,
+                         uint64_t repeats, timings *t, qp_stream *stream, qp_error *err) {
+    unsigned char *buffer = NULL;
+    size_t size = 0;
+    qp_status status = QP_OK;
+    /* One run more at the start warms caches and sizes the buffers; it is not counted. */
+    for (uint64_t i = 0; i <= repeats && status == QP_OK; ++i) {
+        status = qp_frame_eval(evaluation->frame, tessellation, stream, err);
+        if (status != QP_OK) break;
+        if (stream->support_bytes > t->peak_support_bytes) t->peak_support_bytes = stream->support_bytes;
+        if (buffer == NULL) {
+            size = (size_t)stream->n_samples * 6 *
+                   (stream->precision == QP_DOUBLE ? sizeof(double) : sizeof(float));
+            buffer = qp_alloc(size, 1, false);
+            if (buffer == NULL) {
+                status = qp_fail_memory(err, size, "the memset that a frame is compared with");
+                break;
+            }
+        }
+        double begin = qp_now_ms();
+        qp_parallel(size, size / (4 * qp_thread_count()) + 1, fill_part, buffer);
+        double fill = qp_now_ms() - begin;
+        if (i == 0) continue;
+        t->hull[i - 1] = stream->hull_ms;
+        t->domain[i - 1] = stream->domain_ms;
+        t->frame[i - 1] = stream->frame_ms;
+        t->fill[i - 1] = fill;
+        t->count = i;
+    }
+    free(buffer);
+    return status;
+}
+
+static void print_result(bool as_json, const char *name, const cli_evaluation *evaluation,
+                         const cli_evaluation_options *options, const timings *t, const qp_stream *s) {
+    double frame_ms = median(t->frame, t->count), fill_ms = median(t->fill, t->count);
+    double rate = frame_ms > 0 ? (double)s->n_samples / frame_ms * 1e3 : 0;
+    double ratio = frame_ms > 0 ? fill_ms / frame_ms : 0;
+    static const char *const spacings[] = {"equal", "fractional_even", "fractional_odd"};
+    if (!as_json) {
+        printf("%s on %s\n", name, qp_device_name(evaluation->device));
+        printf("  %" PRIu32 " patches, %" PRIu64 " samples, %" PRIu64 " triangles\n",
+               evaluation->mesh->n_patches, s->n_samples, s->n_triangles);
+        printf("  frame %.3f ms (hull %.3f, domain %.3f), median of %" PRIu64 "\n", frame_ms,
+               median(t->hull, t->count), median(t->domain, t->count), t->count);
+        printf("  %.2f million samples a second, %.4f of the speed of memset\n", rate * 1e-6, ratio);
+        printf("  control points %" PRIu64 " bytes, stream hash %016" PRIx64 "\n", t->peak_support_bytes,
+               s->hash);
+        return;
+    }
+    char hash[20];
+    snprintf(hash, sizeof hash, "%016" PRIx64, s->hash);
+    qp_json json;
+    qp_json_begin(&json, stdout);
+    qp_json_text(&json, "mesh", name);
+    qp_json_real(&json, "tess", options->tess);
+    qp_json_text(&json, "spacing", spacings[options->spacing]);
+    qp_json_text(&json, "precision", options->precision == QP_DOUBLE ? "double" : "float");
+    qp_json_integer(&json, "patches", evaluation->mesh->n_patches);
+    qp_json_integer(&json, "samples", s->n_samples);
+    qp_json_integer(&json, "triangles", s->n_triangles);
+    qp_json_integer(&json, "repeat", t->count);
+    qp_json_real(&json, "hull_ms", median(t->hull, t->count));
+    qp_json_real(&json, "domain_ms", median(t->domain, t->count));
+    qp_json_real(&json, "frame_ms", frame_ms);
+    qp_json_real(&json, "memset_ms", fill_ms);
+    qp_json_real(&json, "samples_per_second", rate);
+    qp_json_real(&json, "memset_ratio", ratio);
+    qp_json_integer(&json, "peak_support_bytes", t->peak_support_bytes);
+    qp_json_text(&json, "stream_hash", hash);
+    qp_json_text(&json, "device", qp_device_name(evaluation->device));
+    qp_json_finish(&json);
+}
+
+static qp_status run(int argc, char **argv, qp_error *err) {
+    cli_evaluation_options o = CLI_EVALUATION_DEFAULTS;
+    const char *path = NULL;
+    uint64_t repeats = 1;
+    bool json = false;
+    const cli_option options[] = {
+        CLI_EVALUATION_OPTIONS(o),
+        {"--repeat", "N", "timed evaluations, 1 to 1000; times are medians (default 1)", CLI_COUNT, &repeats,
+         1, MOST_REPEATS, NULL},
+        {"-o", "FILE", "write the vertex stream: .obj, .ply (binary) or .npy (n x 6)", CLI_TEXT, &path, 0, 0,
+         NULL},
+        {"--json", NULL, "print one JSON object", CLI_FLAG, &json, 0, 0, NULL},
+        {0},
+    };
+    cli_arguments arguments;
+    qp_status status = cli_parse(&cli_eval, options, argc, argv, 1, &arguments, err);
+    if (status != QP_OK || arguments.help) return status;
+    if (path != NULL) status = cli_stream_check_name(path, err);
+    if (status != QP_OK) return status;
+
+    cli_evaluation evaluation;
+    status = cli_evaluation_open(arguments.values[0], &o, true, &evaluation, err);
+    if (status != QP_OK) return status;
+    qp_tessellation tessellation = {.spacing = (qp_spacing)o.spacing, .factor = (float)o.tess};
+    qp_stream stream = {0};
+    timings *t = qp_alloc(1, sizeof *t, true);
+    if (t == NULL) status = qp_fail_memory(err, sizeof *t, "timings");
+    if (status == QP_OK) status = measure(&evaluation, &tessellation, repeats, t, &stream, err);
+    if (status == QP_OK && path != NULL) status = cli_stream_write(&stream, path, err);
+    if (status == QP_OK) print_result(json, arguments.values[0], &evaluation, &o, t, &stream);
+    free(t);
+    cli_evaluation_close(&evaluation);
+    return status;
+}
+
+const cli_command cli_eval = {
+    "eval", "MESH", "Evaluates the vertex stream of a mesh, times it, and writes it.",
+    CLI_MESH_HELP "\nmemset_ratio is the time to set as many bytes on all cores over the time of a frame.",
+    run};

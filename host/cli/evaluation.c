@@ -1,0 +1,32 @@
+#include "host/cli/evaluation.h"
+
+#include <stdlib.h>
+
+qp_status cli_evaluation_open(const char *argument, const cli_evaluation_options *options,
+                              bool want_triangles, cli_evaluation *evaluation, qp_error *err) {
+    *evaluation = (cli_evaluation){0};
+    qp_surface_options surface_options = {.depth = (uint32_t)options->depth};
+    qp_frame_options frame_options = {
+        .precision = (qp_precision)options->precision,
+        .want_triangles = want_triangles,
+        .want_hash = want_triangles,
+        .no_regular_pass = options->no_regular_pass,
+    };
+    qp_status status = cli_mesh_open(argument, &options->mesh, &evaluation->mesh, err);
+    if (status == QP_OK)
+        status = qp_surface_create(evaluation->mesh, &surface_options, &evaluation->surface, err);
+    if (status == QP_OK) status = qp_device_open(options->device, &evaluation->device, err);
+    if (status == QP_OK)
+        status =
+            qp_frame_create(evaluation->device, evaluation->surface, &frame_options, &evaluation->frame, err);
+    if (status != QP_OK) cli_evaluation_close(evaluation);
+    return status;
+}
+
+void cli_evaluation_close(cli_evaluation *evaluation) {
+    qp_frame_free(evaluation->frame);
+    qp_device_free(evaluation->device);
+    qp_surface_free(evaluation->surface);
+    qp_mesh_free(evaluation->mesh);
+    *evaluation = (cli_evaluation){0};
+}

@@ -1,0 +1,58 @@
+/* What `eval` and `error` share: a mesh, its surface, a device and a frame, from common options. */
+#ifndef QP_CLI_EVALUATION_H
+#define QP_CLI_EVALUATION_H
+
+#include "host/cli/cli.h"
+
+typedef struct cli_evaluation_options {
+    cli_mesh_options mesh;
+    double tess;
+    int spacing, precision; /* indices into CLI_SPACINGS, CLI_PRECISIONS, which are the API's values */
+    uint64_t depth;         /* 0: the library's default */
+    const char *device;     /* NULL: the library's default */
+    bool no_regular_pass;
+} cli_evaluation_options;
+
+#define CLI_EVALUATION_DEFAULTS                                                                              \
+    { .tess = 16 }
+#define CLI_EVALUATION_OPTIONS(o)                                                                            \
+    {"--tess", "F", "uniform tessellation factor, 1 to 64 (default 16)", CLI_REAL, &(o).tess, 1, 64, NULL},  \
+        {"--spacing", CLI_SPACINGS, "of the tessellator (default equal)", CLI_CHOICE, &(o).spacing, 0,       \
+         0,           NULL},                                                                                 \
+        {"--precision",                                                                                      \
+         CLI_PRECISIONS,                                                                                     \
+         "of stencils and kernels (default float)",                                                          \
+         CLI_CHOICE,                                                                                         \
+         &(o).precision,                                                                                     \
+         0,                                                                                                  \
+         0,                                                                                                  \
+         NULL},                                                                                              \
+        {"--depth", "N",        "deepest subdivision level of the plans, 1 to 12 (default 10)",              \
+         CLI_COUNT, &(o).depth, 1,                                                                           \
+         12,        NULL},                                                                                   \
+        {"--device", "D",         "host, P.D, or part of a name, as `quadplan devices` lists them",          \
+         CLI_TEXT,   &(o).device, 0,                                                                         \
+         0,          NULL},                                                                                  \
+        {"--no-regular-pass",                                                                                \
+         NULL,                                                                                               \
+         "evaluate regular patches by the general kernels, for comparison",                                  \
+         CLI_FLAG,                                                                                           \
+         &(o).no_regular_pass,                                                                               \
+         0,                                                                                                  \
+         0,                                                                                                  \
+         NULL},                                                                                              \
+        CLI_MESH_OPTIONS((o).mesh)
+
+typedef struct cli_evaluation {
+    qp_mesh *mesh;
+    qp_surface *surface;
+    qp_device *device;
+    qp_frame *frame;
+} cli_evaluation;
+
+/* Frees what it made when it fails. want_triangles: triangles and the stream's hash too. */
+qp_status cli_evaluation_open(const char *argument, const cli_evaluation_options *options,
+                              bool want_triangles, cli_evaluation *evaluation, qp_error *err);
+void cli_evaluation_close(cli_evaluation *evaluation);
+
+#endif

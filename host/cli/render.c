@@ -1,0 +1,143 @@
+/* quadplan render: a scene to a picture. */
+#include "gl/render_stream.h"
+#include "host/cli/cli.h"
+
+#include <inttypes.h>
+#include <stdlib.h>
+
+#define COLOURS "material|kind|level|plan|patch|normal"
+
+/* What the command line asks for over what the scene says. */
+typedef struct overrides {
+    bool colour_given, wireframe, tess_given, spacing_given, size_given;
+    int colour, spacing, precision;
+    double tess;
+    uint64_t depth;
+    cli_sizes size;
+    const char *device;
+} overrides;
+
+static qp_status apply(const overrides *o, qp_scene *scene, qp_error *err) {
+    if (o->colour_given) scene->colour_by = (qp_colour)o->colour;
+    if (o->wireframe && !(scene->wire_width > 0)) scene->wire_width = 1;
+    if (o->tess_given) {
+        scene->factor = o->tess;
+        scene->random_factors = false;
+    }
+    if (o->spacing_given) scene->spacing = (qp_spacing)o->spacing;
+    if (o->depth != 0) scene->surface_options.depth = (uint32_t)o->depth;
+    if (!o->size_given) return QP_OK;
+    const uint32_t *n = o->size.n;
+    if (o->size.count != 2 || n[0] < 1 || n[1] < 1 || n[0] > QP_IMAGE_SIDE_MAX || n[1] > QP_IMAGE_SIDE_MAX)
+        return qp_fail(err, QP_BAD_INPUT, "--size: width and height are from 1 to %u", QP_IMAGE_SIDE_MAX);
+    scene->width = n[0];
+    scene->height = n[1];
+    return QP_OK;
+}
+
+/* All that a picture is made from; freed together. */
+typedef struct work {
+    qp_scene *scene;
+    qp_mesh *mesh;
+    qp_surface *surface;
+    qp_device *device;
+    qp_frame *frame;
+    float *factors;
+    qp_image image;
+    qp_stream stream;
+    char backend[128];
+} work;
+
+static void work_free(work *w) {
+    qp_image_free(&w->image);
+    free(w->factors);
+    qp_frame_free(w->frame);
+    qp_device_free(w->device);
+    qp_surface_free(w->surface);
+    qp_mesh_free(w->mesh);
+    qp_scene_free(w->scene);
+}
+
+static qp_status draw(const char *path, const overrides *o, work *w, qp_error *err) {
+    qp_frame_options frame_options = {
+        .precision = (qp_precision)o->precision, .want_triangles = 1, .want_hash = 1};
+    qp_tessellation tessellation;
+    qp_status status = qp_scene_read(path, &w->scene, err);
+    if (status == QP_OK) status = apply(o, w->scene, err);
+    if (status == QP_OK) status = qp_scene_mesh(w->scene, cli_print_warning, NULL, &w->mesh, err);
+    if (status == QP_OK) status = qp_surface_create(w->mesh, &w->scene->surface_options, &w->surface, err);
+    if (status == QP_OK) status = qp_device_open(o->device, &w->device, err);
+    if (status == QP_OK) status = qp_frame_create(w->device, w->surface, &frame_options, &w->frame, err);
+    if (status == QP_OK) status = qp_scene_tessellation(w->scene, w->mesh, &tessellation, &w->factors, err);
+    if (status == QP_OK) status = qp_frame_eval(w->frame, &tessellation, &w->stream, err);
+    if (status == QP_OK)
+        status = qp_render_stream(w->scene, w->surface, &w->stream, &w->image, w->backend, err);
+    return status;
+}
+
+static void print_result(bool as_json, const char *scene, const char *picture, const work *w) {
+    const qp_stream *s = &w->stream;
+    if (!as_json) {
+        printf("%s: %" PRIu32 "x%" PRIu32 ", %" PRIu64 " samples, %" PRIu64 " triangles\n", picture,
+               w->image.width, w->image.height, s->n_samples, s->n_triangles);
+        printf("  evaluated on %s in %.2f ms, drawn by %s\n", qp_device_name(w->device), s->frame_ms,
+               w->backend);
+        return;
+    }
+    char hash[20];
+    snprintf(hash, sizeof hash, "%016" PRIx64, s->hash);
+    qp_json json;
+    qp_json_begin(&json, stdout);
+    qp_json_text(&json, "scene", scene);
+    qp_json_text(&json, "picture", picture);
+    qp_json_integer(&json, "width", w->image.width);
+    qp_json_integer(&json, "height", w->image.height);
+    qp_json_integer(&json, "patches", w->mesh->n_patches);
+    qp_json_integer(&json, "samples", s->n_samples);
+    qp_json_integer(&json, "triangles", s->n_triangles);
+    qp_json_real(&json, "frame_ms", s->frame_ms);
+    qp_json_text(&json, "stream_hash", hash);
+    qp_json_text(&json, "device", qp_device_name(w->device));
+    qp_json_text(&json, "gl", w->backend);
+    qp_json_finish(&json);
+}
+
+static qp_status run(int argc, char **argv, qp_error *err) {
+    overrides o = {0};
+    const char *picture = NULL;
+    bool json = false;
+    const cli_option options[] = {
+        {"-o", "FILE", "where to write the picture: .png or .exr", CLI_TEXT, &picture, 0, 0, NULL},
+        {"--color", COLOURS, "what to colour by", CLI_CHOICE, &o.colour, 0, 0, &o.colour_given},
+        {"--wireframe", NULL, "draw the tessellation's edges", CLI_FLAG, &o.wireframe, 0, 0, NULL},
+        {"--tess", "F", "one tessellation factor for all, 1 to 64", CLI_REAL, &o.tess, 1, 64, &o.tess_given},
+        {"--spacing", CLI_SPACINGS, "of the tessellator", CLI_CHOICE, &o.spacing, 0, 0, &o.spacing_given},
+        {"--size", "WxH", "of the picture, in pixels", CLI_SIZES, &o.size, 0, 0, &o.size_given},
+        {"--precision", CLI_PRECISIONS, "of stencils and kernels (default float)", CLI_CHOICE, &o.precision,
+         0, 0, NULL},
+        {"--depth", "N", "deepest subdivision level of the plans, 1 to 12", CLI_COUNT, &o.depth, 1, 12, NULL},
+        {"--device", "D", "host, P.D, or part of a name, as `quadplan devices` lists them", CLI_TEXT,
+         &o.device, 0, 0, NULL},
+        {"--json", NULL, "print one JSON object", CLI_FLAG, &json, 0, 0, NULL},
+        {0},
+    };
+    cli_arguments arguments;
+    qp_status status = cli_parse(&cli_render, options, argc, argv, 1, &arguments, err);
+    if (status != QP_OK || arguments.help) return status;
+    if (picture == NULL) return qp_fail(err, QP_BAD_INPUT, "render needs -o FILE.png or -o FILE.exr");
+    status = qp_image_check_path(picture, err);
+    if (status != QP_OK) return status;
+
+    work w = {0};
+    status = draw(arguments.values[0], &o, &w, err);
+    if (status == QP_OK) status = qp_image_write(picture, &w.image, err);
+    if (status == QP_OK) print_result(json, arguments.values[0], picture, &w);
+    work_free(&w);
+    return status;
+}
+
+const cli_command cli_render = {
+    "render", "SCENE", "Draws a scene file to a picture.",
+    "SCENE is a JSON file; options go before what it says. The picture is drawn by "
+    "OSMesa, or by EGL\nwithout a surface; QUADPLAN_GL=osmesa|egl insists on one.",
+    run};
