@@ -63,21 +63,15 @@ typedef struct cli_mesh_options {
     int boundary, creases, triangles; /* indices into the words of CLI_MESH_OPTIONS */
 } cli_mesh_options;
 
+/* clang-format off */
 #define CLI_MESH_OPTIONS(o)                                                                                  \
-    {"--boundary",                                                                                           \
-     "none|edge-and-corner|edge",                                                                            \
-     "boundary rule, whatever the file says",                                                                \
-     CLI_CHOICE,                                                                                             \
-     &(o).boundary,                                                                                          \
-     0,                                                                                                      \
-     0,                                                                                                      \
-     &(o).boundary_given},                                                                                   \
-        {"--creases", "uniform|chaikin", "crease rule, whatever the file says", CLI_CHOICE, &(o).creases, 0, \
-         0,           &(o).creases_given},                                                                   \
-    {                                                                                                        \
-        "--triangles", "catmark|smooth", "triangle rule, whatever the file says", CLI_CHOICE,                \
-            &(o).triangles, 0, 0, &(o).triangles_given                                                       \
-    }
+    {"--boundary", "none|edge-and-corner|edge", "boundary rule, whatever the file says",                     \
+     CLI_CHOICE, &(o).boundary, 0, 0, &(o).boundary_given},                                                  \
+    {"--creases", "uniform|chaikin", "crease rule, whatever the file says",                                  \
+     CLI_CHOICE, &(o).creases, 0, 0, &(o).creases_given},                                                    \
+    {"--triangles", "catmark|smooth", "triangle rule, whatever the file says",                               \
+     CLI_CHOICE, &(o).triangles, 0, 0, &(o).triangles_given}
+/* clang-format on */
 
 /* An OBJ file, or "gen:KIND[,n=AxBxC][,sharpness=S][,seed=N][,faces=N]". Warnings go to stderr. */
 qp_status cli_mesh_open(const char *argument, const cli_mesh_options *options, qp_mesh **mesh, qp_error *err);

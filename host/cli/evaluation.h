@@ -15,33 +15,22 @@ typedef struct cli_evaluation_options {
 
 #define CLI_EVALUATION_DEFAULTS                                                                              \
     { .tess = 16 }
+/* clang-format off */
 #define CLI_EVALUATION_OPTIONS(o)                                                                            \
-    {"--tess", "F", "uniform tessellation factor, 1 to 64 (default 16)", CLI_REAL, &(o).tess, 1, 64, NULL},  \
-        {"--spacing", CLI_SPACINGS, "of the tessellator (default equal)", CLI_CHOICE, &(o).spacing, 0,       \
-         0,           NULL},                                                                                 \
-        {"--precision",                                                                                      \
-         CLI_PRECISIONS,                                                                                     \
-         "of stencils and kernels (default float)",                                                          \
-         CLI_CHOICE,                                                                                         \
-         &(o).precision,                                                                                     \
-         0,                                                                                                  \
-         0,                                                                                                  \
-         NULL},                                                                                              \
-        {"--depth", "N",        "deepest subdivision level of the plans, 1 to 12 (default 10)",              \
-         CLI_COUNT, &(o).depth, 1,                                                                           \
-         12,        NULL},                                                                                   \
-        {"--device", "D",         "host, P.D, or part of a name, as `quadplan devices` lists them",          \
-         CLI_TEXT,   &(o).device, 0,                                                                         \
-         0,          NULL},                                                                                  \
-        {"--no-regular-pass",                                                                                \
-         NULL,                                                                                               \
-         "evaluate regular patches by the general kernels, for comparison",                                  \
-         CLI_FLAG,                                                                                           \
-         &(o).no_regular_pass,                                                                               \
-         0,                                                                                                  \
-         0,                                                                                                  \
-         NULL},                                                                                              \
-        CLI_MESH_OPTIONS((o).mesh)
+    {"--tess", "F", "uniform tessellation factor, 1 to 64 (default 16)",                                     \
+     CLI_REAL, &(o).tess, 1, 64, NULL},                                                                      \
+    {"--spacing", CLI_SPACINGS, "of the tessellator (default equal)",                                        \
+     CLI_CHOICE, &(o).spacing, 0, 0, NULL},                                                                  \
+    {"--precision", CLI_PRECISIONS, "of stencils and kernels (default float)",                               \
+     CLI_CHOICE, &(o).precision, 0, 0, NULL},                                                                \
+    {"--depth", "N", "deepest subdivision level of the plans, 1 to 12 (default 10)",                         \
+     CLI_COUNT, &(o).depth, 1, 12, NULL},                                                                    \
+    {"--device", "D", "host, P.D, or part of a name, as `quadplan devices` lists them",                      \
+     CLI_TEXT, &(o).device, 0, 0, NULL},                                                                     \
+    {"--no-regular-pass", NULL, "evaluate regular patches by the general kernels, for comparison",           \
+     CLI_FLAG, &(o).no_regular_pass, 0, 0, NULL},                                                            \
+    CLI_MESH_OPTIONS((o).mesh)
+/* clang-format on */
 
 typedef struct cli_evaluation {
     qp_mesh *mesh;

@@ -138,6 +138,6 @@ static qp_status run(int argc, char **argv, qp_error *err) {
 
 const cli_command cli_render = {
     "render", "SCENE", "Draws a scene file to a picture.",
-    "SCENE is a JSON file; options go before what it says. The picture is drawn by "
+    "SCENE is a JSON file; what the options say goes before it. The picture is drawn by "
     "OSMesa, or by EGL\nwithout a surface; QUADPLAN_GL=osmesa|egl insists on one.",
     run};
