@@ -15,8 +15,8 @@
 #include <string.h>
 
 void qp_corner_work_free(qp_corner_work *work) {
-    qp_local_free(&work->step[0]);
-    qp_local_free(&work->step[1]);
+    qp_piece_free(&work->step[0]);
+    qp_piece_free(&work->step[1]);
     free(work->ring);
     free(work->next);
     memset(work, 0, sizeof *work);
@@ -48,21 +48,21 @@ static long double eigenvalue(long double theta) {
     return (5 + c + cosl(theta / 2) * sqrtl(2 * (9 + c))) / 16;
 }
 
-static bool is_stationary(const qp_local_mesh *m, uint32_t vertex) {
-    qp_local_kind kind = qp_local_vertex_kind(m, vertex);
-    return kind.quads && kind.n_semisharp == 0 && !qp_local_semisharp(m->vertices[vertex].sharpness);
+static bool is_stationary(const qp_piece *m, uint32_t vertex) {
+    qp_piece_kind kind = qp_piece_vertex_kind(m, vertex);
+    return kind.quads && kind.n_semisharp == 0 && !qp_piece_semisharp(m->vertices[vertex].sharpness);
 }
 
-static void relative(const qp_local_mesh *m, uint32_t from, uint32_t to, qp_quad out[3]) {
+static void relative(const qp_piece *m, uint32_t from, uint32_t to, qp_quad out[3]) {
     for (int c = 0; c < 3; ++c) out[c] = m->vertices[to].p[c] - m->vertices[from].p[c];
 }
 
-static void sum_infinite_ends(const qp_local_mesh *m, uint32_t vertex, qp_quad sum[3]) {
+static void sum_infinite_ends(const qp_piece *m, uint32_t vertex, qp_quad sum[3]) {
     sum[0] = sum[1] = sum[2] = 0;
     for (uint32_t i = m->vertex_edge_offsets[vertex]; i < m->vertex_edge_offsets[vertex + 1]; ++i) {
-        const qp_local_edge *e = &m->edges[m->vertex_edges[i]];
+        const qp_piece_edge *e = &m->edges[m->vertex_edges[i]];
         qp_quad end[3];
-        if (!qp_local_infinite(e->sharpness)) continue;
+        if (!qp_piece_infinite(e->sharpness)) continue;
         relative(m, vertex, e->v[e->v[0] == vertex], end);
         for (int c = 0; c < 3; ++c) sum[c] += end[c];
     }
@@ -70,21 +70,21 @@ static void sum_infinite_ends(const qp_local_mesh *m, uint32_t vertex, qp_quad s
 
 /* Walks the sector of `corner`: clockwise (over the edge after the corner) to its first crease or once
  * around, then counter-clockwise, listing. */
-static qp_status gather_sector(const qp_local_mesh *m, uint32_t corner, qp_corner_work *work, sector *s,
+static qp_status gather_sector(const qp_piece *m, uint32_t corner, qp_corner_work *work, sector *s,
                                qp_error *err) {
     uint32_t vertex = m->corner_vertex[corner], first = corner;
-    qp_local_kind kind = qp_local_vertex_kind(m, vertex);
+    qp_piece_kind kind = qp_piece_vertex_kind(m, vertex);
     if (!qp_grow((void **)&work->ring, &work->ring_capacity, 3 * (2 * (size_t)kind.n_faces + 1),
                  sizeof *work->ring))
         return qp_fail_memory(err, kind.n_faces * sizeof *work->ring, "the ring of a vertex");
     s->here = 0;
-    while (!qp_local_infinite(m->edges[m->corner_edge[first]].sharpness)) {
-        uint32_t to = qp_local_across(m, first, m->corner_edge[first]);
+    while (!qp_piece_infinite(m->edges[m->corner_edge[first]].sharpness)) {
+        uint32_t to = qp_piece_across(m, first, m->corner_edge[first]);
         if (to == corner || to == QP_NONE) break;
         first = to;
         s->here++;
     }
-    s->fan = !qp_local_infinite(m->edges[m->corner_edge[first]].sharpness);
+    s->fan = !qp_piece_infinite(m->edges[m->corner_edge[first]].sharpness);
     if (s->fan) {
         first = corner;
         s->here = 0;
@@ -92,14 +92,14 @@ static qp_status gather_sector(const qp_local_mesh *m, uint32_t corner, qp_corne
     s->e = work->ring;
     s->f = work->ring + 3 * ((size_t)kind.n_faces + 1);
     uint32_t at = first, k = 0;
-    relative(m, vertex, m->corner_vertex[qp_local_next(m, at)], s->e);
+    relative(m, vertex, m->corner_vertex[qp_piece_next(m, at)], s->e);
     for (;;) {
-        uint32_t prev = qp_local_prev(m, at);
-        relative(m, vertex, m->corner_vertex[qp_local_next(m, qp_local_next(m, at))], s->f + 3 * (size_t)k);
+        uint32_t prev = qp_piece_prev(m, at);
+        relative(m, vertex, m->corner_vertex[qp_piece_next(m, qp_piece_next(m, at))], s->f + 3 * (size_t)k);
         relative(m, vertex, m->corner_vertex[prev], s->e + 3 * ((size_t)k + 1));
         k++;
-        if (qp_local_infinite(m->edges[m->corner_edge[prev]].sharpness) || k == kind.n_faces) break;
-        at = qp_local_across(m, at, m->corner_edge[prev]);
+        if (qp_piece_infinite(m->edges[m->corner_edge[prev]].sharpness) || k == kind.n_faces) break;
+        at = qp_piece_across(m, at, m->corner_edge[prev]);
         if (at == first || at == QP_NONE) break;
     }
     s->k = k;
@@ -108,9 +108,7 @@ static qp_status gather_sector(const qp_local_mesh *m, uint32_t corner, qp_corne
     if (m->vertices[vertex].sharpness > 0.0f || kind.n_infinite > 2)
         s->kind = SECTOR_CORNER;
     else
-        s->kind = kind.n_infinite == 2   ? SECTOR_CREASE
-                  : kind.n_infinite == 1 ? SECTOR_DART
-                                         : SECTOR_SMOOTH;
+        s->kind = kind.n_infinite == 2 ? SECTOR_CREASE : kind.n_infinite == 1 ? SECTOR_DART : SECTOR_SMOOTH;
     return QP_OK;
 }
 
@@ -247,15 +245,15 @@ static qp_status dart_limit(sector *s, qp_corner_work *work, qp_corner_limit *li
 }
 
 /* Refines the vertex's ring until its rules repeat; *corner is followed. */
-static qp_status settle(qp_local_mesh **mesh, uint32_t *corner, qp_corner_work *work, double *scale,
+static qp_status settle(qp_piece **mesh, uint32_t *corner, qp_corner_work *work, double *scale,
                         qp_error *err) {
     int turn = 0;
     while (!is_stationary(*mesh, (*mesh)->corner_vertex[*corner])) {
         uint32_t center = (*mesh)->corner_vertex[*corner];
-        qp_local_mesh *parent = *mesh, *child = &work->step[turn];
+        qp_piece *parent = *mesh, *child = &work->step[turn];
         uint32_t place = *corner - parent->face_offsets[parent->corner_face[*corner]];
-        bool quad = qp_local_face_size(parent, parent->corner_face[*corner]) == 4;
-        qp_status status = qp_local_refine(parent, &center, 1, child, err);
+        bool quad = qp_piece_face_size(parent, parent->corner_face[*corner]) == 4;
+        qp_status status = qp_piece_refine(parent, &center, 1, child, err);
         if (status) return status;
         *corner = child->face_offsets[parent->corner_child[*corner]] + (quad ? place : 0);
         *mesh = child;
@@ -265,7 +263,7 @@ static qp_status settle(qp_local_mesh **mesh, uint32_t *corner, qp_corner_work *
     return QP_OK;
 }
 
-qp_status qp_corner_eval(qp_local_mesh *mesh, uint32_t corner, qp_corner_work *work, qp_corner_limit *limit,
+qp_status qp_corner_eval(qp_piece *mesh, uint32_t corner, qp_corner_work *work, qp_corner_limit *limit,
                          qp_error *err) {
     sector s = {.scale = 1};
     memset(limit, 0, sizeof *limit);

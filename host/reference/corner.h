@@ -2,11 +2,11 @@
 #ifndef QP_REFERENCE_CORNER_H
 #define QP_REFERENCE_CORNER_H
 
-#include "host/reference/local.h"
+#include "host/reference/piece.h"
 
 /* Buffers that grow as needed; zero-initialise, free with qp_corner_work_free. */
 typedef struct qp_corner_work {
-    qp_local_mesh step[2];
+    qp_piece step[2];
     qp_quad *ring; /* of a sector: the far ends of its spokes and the opposite vertices of its faces */
     size_t ring_capacity;
     qp_quad *next;
@@ -26,7 +26,7 @@ typedef struct qp_corner_limit {
 
 /* The limit at a corner of the mesh as the face of that corner sees it (at creases, its side). The corner's
  * vertex must be complete; the mesh's maps are used as scratch. */
-qp_status qp_corner_eval(qp_local_mesh *mesh, uint32_t corner, qp_corner_work *work,
-                         qp_corner_limit *limit, qp_error *err);
+qp_status qp_corner_eval(qp_piece *mesh, uint32_t corner, qp_corner_work *work, qp_corner_limit *limit,
+                         qp_error *err);
 
 #endif

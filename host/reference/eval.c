@@ -8,7 +8,7 @@
 #include "host/reference/patch.h"
 
 void qp_reference_work_free(qp_reference_work *work) {
-    for (size_t i = 0; i < sizeof work->levels / sizeof *work->levels; ++i) qp_local_free(&work->levels[i]);
+    for (size_t i = 0; i < sizeof work->levels / sizeof *work->levels; ++i) qp_piece_free(&work->levels[i]);
     qp_corner_work_free(&work->corner);
     free(work->uv);
     free(work->order);
@@ -58,7 +58,7 @@ static void eval_regular(const visit *t, const cell *at, const qp_leaf *leaf) {
 /* The sample at corner j of the cell. du, dv of corner j in terms of the edges that leave it:
  * 0: next, prev; 1: -prev, next; 2: -next, -prev; 3: prev, -next. */
 static qp_status eval_corner(const visit *t, const cell *at, uint32_t j, qp_reference_sample *s) {
-    qp_local_mesh *mesh = &t->work->levels[at->mesh];
+    qp_piece *mesh = &t->work->levels[at->mesh];
     qp_corner_limit limit;
     qp_status status =
         qp_corner_eval(mesh, mesh->face_offsets[at->face] + j, &t->work->corner, &limit, t->err);
@@ -117,7 +117,7 @@ static uint32_t split(const visit *t, uint32_t begin, uint32_t end, int axis) {
 
 static qp_status descend(const visit *t, cell at) {
     qp_reference_work *work = t->work;
-    qp_local_mesh *mesh = &work->levels[at.mesh];
+    qp_piece *mesh = &work->levels[at.mesh];
     qp_leaf leaf;
     if (qp_leaf_make(mesh, at.face, &leaf)) {
         eval_regular(t, &at, &leaf);
@@ -126,7 +126,7 @@ static qp_status descend(const visit *t, cell at) {
     qp_status status = take_corners(t, &at);
     if (status || at.begin == at.end) return status;
     const uint32_t *corners = mesh->corner_vertex + mesh->face_offsets[at.face];
-    status = qp_local_refine(mesh, corners, 4, &work->levels[at.mesh + 1], t->err);
+    status = qp_piece_refine(mesh, corners, 4, &work->levels[at.mesh + 1], t->err);
     if (status) return status;
     uint32_t children[4];
     memcpy(children, mesh->corner_child + mesh->face_offsets[at.face], sizeof children);
@@ -141,7 +141,8 @@ static qp_status descend(const visit *t, cell at) {
             uv[0] = 2 * uv[0] - (q & 1); /* exact */
             uv[1] = 2 * uv[1] - (q >> 1);
         }
-        status = descend(t, (cell){at.level + 1, at.mesh + 1, children[quadrant[q]], bounds[q], bounds[q + 1]});
+        status =
+            descend(t, (cell){at.level + 1, at.mesh + 1, children[quadrant[q]], bounds[q], bounds[q + 1]});
     }
     return status;
 }
@@ -149,19 +150,20 @@ static qp_status descend(const visit *t, cell at) {
 static qp_status check_samples(const qp_mesh *mesh, uint32_t patch, size_t count, const double *uv,
                                qp_error *err) {
     if (patch >= mesh->n_patches)
-        return qp_fail(err, QP_BAD_INPUT, "patch %u is out of range: the mesh has %u", patch, mesh->n_patches);
+        return qp_fail(err, QP_BAD_INPUT, "patch %u is out of range: the mesh has %u", patch,
+                       mesh->n_patches);
     if (count > UINT32_MAX / 2)
         return qp_fail(err, QP_BAD_INPUT, "%zu samples in one patch are too many", count);
     for (size_t i = 0; i < count; ++i)
         if (!(uv[2 * i] >= 0 && uv[2 * i] <= 1 && uv[2 * i + 1] >= 0 && uv[2 * i + 1] <= 1))
-            return qp_fail(err, QP_BAD_INPUT, "sample %zu of patch %u, (%g, %g), lies outside [0,1]^2", i, patch,
-                           uv[2 * i], uv[2 * i + 1]);
+            return qp_fail(err, QP_BAD_INPUT, "sample %zu of patch %u, (%g, %g), lies outside [0,1]^2", i,
+                           patch, uv[2 * i], uv[2 * i + 1]);
     return QP_OK;
 }
 
 qp_status qp_reference_eval_with(qp_reference_work *work, const qp_mesh *mesh, const double *positions,
-                                 uint32_t patch, size_t count, const double *uv,
-                                 qp_reference_sample *samples, qp_error *err) {
+                                 uint32_t patch, size_t count, const double *uv, qp_reference_sample *samples,
+                                 qp_error *err) {
     qp_status status = check_samples(mesh, patch, count, uv, err);
     if (status) return status;
     uint32_t child, face = qp_patch_face(mesh, patch, &child);
@@ -174,11 +176,12 @@ qp_status qp_reference_eval_with(qp_reference_work *work, const qp_mesh *mesh, c
     memcpy(work->uv, uv, 2 * count * sizeof *uv);
     for (size_t i = 0; i < count; ++i) work->order[i] = (uint32_t)i;
 
-    qp_local_mesh *base = &work->levels[0];
+    qp_piece *base = &work->levels[0];
     cell root = {0, 0, 0, 0, (uint32_t)count};
-    status = qp_local_gather(mesh, positions, face, base, err);
-    if (!status && qp_local_face_size(base, 0) != 4) {
-        status = qp_local_refine(base, base->corner_vertex, qp_local_face_size(base, 0), &work->levels[1], err);
+    status = qp_piece_gather(mesh, positions, face, base, err);
+    if (!status && qp_piece_face_size(base, 0) != 4) {
+        status =
+            qp_piece_refine(base, base->corner_vertex, qp_piece_face_size(base, 0), &work->levels[1], err);
         if (!status) root.mesh = 1, root.face = base->corner_child[child];
     }
     visit t = {work, samples, err};

@@ -11,7 +11,7 @@ enum { QP_REFERENCE_DEPTH = 104 };
 
 /* Zero-initialise; one thread at a time. */
 typedef struct qp_reference_work {
-    qp_local_mesh levels[QP_REFERENCE_DEPTH + 3];
+    qp_piece levels[QP_REFERENCE_DEPTH + 3];
     qp_corner_work corner;
     double *uv; /* of the samples, local to the cell that is being visited */
     size_t uv_capacity;
@@ -22,7 +22,7 @@ void qp_reference_work_free(qp_reference_work *work);
 
 /* qp_reference_eval with buffers kept between calls. */
 qp_status qp_reference_eval_with(qp_reference_work *work, const qp_mesh *mesh, const double *positions,
-                                 uint32_t patch, size_t count, const double *uv,
-                                 qp_reference_sample *samples, qp_error *err);
+                                 uint32_t patch, size_t count, const double *uv, qp_reference_sample *samples,
+                                 qp_error *err);
 
 #endif

@@ -4,7 +4,7 @@
 #include <string.h>
 
 typedef struct cell {
-    const qp_local_mesh *mesh;
+    const qp_piece *mesh;
     uint32_t corner[4]; /* the face's corners */
     bool sharp[4];      /* side j, from corner j to corner j + 1, is infinitely sharp */
     qp_quad at[4][3];
@@ -14,22 +14,22 @@ typedef struct cell {
 
 /* Whether the surface near the corner is what extrapolated points reproduce. */
 static bool corner_is_regular(const cell *c, uint32_t j) {
-    const qp_local_mesh *m = c->mesh;
+    const qp_piece *m = c->mesh;
     uint32_t vertex = m->corner_vertex[c->corner[j]];
     float sharpness = m->vertices[vertex].sharpness;
     bool before = c->sharp[(j + 3) & 3], after = c->sharp[j];
-    qp_local_kind k = qp_local_vertex_kind(m, vertex);
-    bool is_corner = qp_local_infinite(sharpness) || k.n_infinite > 2;
+    qp_piece_kind k = qp_piece_vertex_kind(m, vertex);
+    bool is_corner = qp_piece_infinite(sharpness) || k.n_infinite > 2;
     if (before && after) return is_corner;
     if (is_corner || sharpness > 0.0f || k.n_semisharp > 0 || !k.quads) return false;
     if (k.n_infinite == 0) return k.n_edges == 4 && k.n_faces == 4;
     if (k.n_infinite != 2 || before == after) return false;
     /* The one other face of a regular crease's side: across the smooth edge, its far edge is the crease. */
-    uint32_t smooth = m->corner_edge[after ? qp_local_prev(m, c->corner[j]) : c->corner[j]];
-    uint32_t other = qp_local_across(m, c->corner[j], smooth);
+    uint32_t smooth = m->corner_edge[after ? qp_piece_prev(m, c->corner[j]) : c->corner[j]];
+    uint32_t other = qp_piece_across(m, c->corner[j], smooth);
     if (other == QP_NONE) return false;
-    uint32_t next = m->corner_edge[other], prev = m->corner_edge[qp_local_prev(m, other)];
-    return qp_local_infinite(m->edges[next == smooth ? prev : next].sharpness);
+    uint32_t next = m->corner_edge[other], prev = m->corner_edge[qp_piece_prev(m, other)];
+    return qp_piece_infinite(m->edges[next == smooth ? prev : next].sharpness);
 }
 
 static void extrapolate(const qp_quad at[3], const qp_quad inside[3], qp_quad outside[3]) {
@@ -41,7 +41,7 @@ static void copy_vertex(const cell *c, uint32_t corner, qp_quad out[3]) {
 }
 
 static void fill_side(cell *c, uint32_t j) {
-    const qp_local_mesh *m = c->mesh;
+    const qp_piece *m = c->mesh;
     uint32_t next = (j + 1) & 3;
     if (c->sharp[j]) {
         extrapolate(c->at[j], c->at[(j + 3) & 3], c->outer[j][0]);
@@ -49,23 +49,23 @@ static void fill_side(cell *c, uint32_t j) {
         return;
     }
     /* The neighbour runs the edge the other way: corner j, and after it its point beyond the side. */
-    uint32_t across = qp_local_across(m, c->corner[j], m->corner_edge[c->corner[j]]);
-    uint32_t beyond = qp_local_next(m, across);
+    uint32_t across = qp_piece_across(m, c->corner[j], m->corner_edge[c->corner[j]]);
+    uint32_t beyond = qp_piece_next(m, across);
     copy_vertex(c, beyond, c->outer[j][0]);
-    copy_vertex(c, qp_local_next(m, beyond), c->outer[j][1]);
+    copy_vertex(c, qp_piece_next(m, beyond), c->outer[j][1]);
 }
 
 static void fill_diagonal(cell *c, uint32_t j) {
-    const qp_local_mesh *m = c->mesh;
+    const qp_piece *m = c->mesh;
     uint32_t before = (j + 3) & 3;
     if (c->sharp[j]) {
         extrapolate(c->outer[before][1], c->outer[before][0], c->diagonal[j]);
     } else if (c->sharp[before]) {
         extrapolate(c->outer[j][0], c->outer[j][1], c->diagonal[j]);
     } else {
-        uint32_t side = qp_local_across(m, c->corner[j], m->corner_edge[c->corner[j]]);
-        uint32_t opposite = qp_local_across(m, side, m->corner_edge[side]);
-        copy_vertex(c, qp_local_next(m, qp_local_next(m, opposite)), c->diagonal[j]);
+        uint32_t side = qp_piece_across(m, c->corner[j], m->corner_edge[c->corner[j]]);
+        uint32_t opposite = qp_piece_across(m, side, m->corner_edge[side]);
+        copy_vertex(c, qp_piece_next(m, qp_piece_next(m, opposite)), c->diagonal[j]);
     }
 }
 
@@ -73,15 +73,15 @@ static void place(qp_leaf *leaf, int v, int u, const qp_quad p[3]) {
     for (int i = 0; i < 3; ++i) leaf->points[v][u][i] = (qp_leaf_real)(p[i] - leaf->origin[i]);
 }
 
-bool qp_leaf_make(const qp_local_mesh *mesh, uint32_t face, qp_leaf *leaf) {
-    if (qp_local_face_size(mesh, face) != 4) return false;
+bool qp_leaf_make(const qp_piece *mesh, uint32_t face, qp_leaf *leaf) {
+    if (qp_piece_face_size(mesh, face) != 4) return false;
     cell c;
     c.mesh = mesh;
     for (uint32_t j = 0; j < 4; ++j) {
         c.corner[j] = mesh->face_offsets[face] + j;
         float s = mesh->edges[mesh->corner_edge[c.corner[j]]].sharpness;
-        if (qp_local_semisharp(s)) return false;
-        c.sharp[j] = qp_local_infinite(s);
+        if (qp_piece_semisharp(s)) return false;
+        c.sharp[j] = qp_piece_infinite(s);
     }
     for (uint32_t j = 0; j < 4; ++j)
         if (!corner_is_regular(&c, j)) return false;

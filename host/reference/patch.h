@@ -4,7 +4,7 @@
 
 #include <float.h>
 
-#include "host/reference/local.h"
+#include "host/reference/piece.h"
 
 /* The last sum over 16 points: relative to one of them, subtracted in qp_quad before, a 64-bit significand
  * keeps 1e-19 of the cell's size, whatever its depth. */
@@ -22,7 +22,7 @@ typedef struct qp_leaf {
 /* Fills *leaf when the surface over the quad is one bicubic patch: every corner regular, or a regular crease
  * or corner of infinitely sharp edges, behind which points are extrapolated. The quad's vertices must be
  * complete. */
-bool qp_leaf_make(const qp_local_mesh *mesh, uint32_t face, qp_leaf *leaf);
+bool qp_leaf_make(const qp_piece *mesh, uint32_t face, qp_leaf *leaf);
 
 /* Position and derivatives at (u,v) in [0,1]^2 of the cell. */
 void qp_leaf_eval(const qp_leaf *leaf, double u, double v, qp_quad p[3], qp_leaf_real du[3],

@@ -1,4 +1,4 @@
-/* One Catmull-Clark step of a local mesh.
+/* One Catmull-Clark step of a piece of mesh.
  *
  * The rules are OpenSubdiv's (Catmull and Clark 1978; DeRose, Kass and Truong 1998 for creases):
  *   face point    mean of the face's vertices
@@ -10,33 +10,33 @@
  * taken exactly and rounded once, so that they do not depend on the order of edges. */
 #include <string.h>
 
-#include "host/reference/local_build.h"
+#include "host/reference/piece_build.h"
 
 static float decrement(float s) {
-    if (qp_local_infinite(s)) return QP_SHARPNESS_INFINITE;
+    if (qp_piece_infinite(s)) return QP_SHARPNESS_INFINITE;
     return s > 1.0f ? s - 1.0f : 0.0f;
 }
 
 /* Sharpness of the child of an edge at one of its ends; v holds the sums over that end. Chaikin's rule
  * (DeRose et al., section 3): 3/4 of the edge's own and 1/4 of the mean of the other semi-sharp ones. */
-static float child_sharpness(const qp_local_mesh *m, const qp_local_vertex *v, float s) {
+static float child_sharpness(const qp_piece *m, const qp_piece_vertex *v, float s) {
     if (s <= 0.0f) return 0.0f;
-    if (!m->chaikin || qp_local_infinite(s) || v->semi_count < 2) return decrement(s);
+    if (!m->chaikin || qp_piece_infinite(s) || v->semi_count < 2) return decrement(s);
     float others = ((float)v->semi_sum - s) / (float)(v->semi_count - 1);
     float child = 0.75f * s + 0.25f * others - 1.0f;
     return child > 0.0f ? child : 0.0f;
 }
 
-static void set_vertex(qp_local_mesh *child, uint32_t index, const qp_quad p[3]) {
-    qp_local_vertex *v = &child->vertices[index];
+static void set_vertex(qp_piece *child, uint32_t index, const qp_quad p[3]) {
+    qp_piece_vertex *v = &child->vertices[index];
     memcpy(v->p, p, sizeof v->p);
     v->sharpness = 0;
     v->semi_sum = 0;
     v->semi_count = 0;
 }
 
-static void face_point(const qp_local_mesh *m, uint32_t face, qp_quad p[3]) {
-    uint32_t size = qp_local_face_size(m, face);
+static void face_point(const qp_piece *m, uint32_t face, qp_quad p[3]) {
+    uint32_t size = qp_piece_face_size(m, face);
     p[0] = p[1] = p[2] = 0;
     for (uint32_t h = m->face_offsets[face]; h < m->face_offsets[face + 1]; ++h)
         for (int c = 0; c < 3; ++c) p[c] += m->vertices[m->corner_vertex[h]].p[c];
@@ -52,33 +52,34 @@ static void face_point(const qp_local_mesh *m, uint32_t face, qp_quad p[3]) {
  * sharpness itself whenever one of the two children is smooth. Under Chaikin's rule that can be more than 1
  * (a sharp edge beside blunt ones may lose more than 1), and its weights then extrapolate; the surface is the
  * one it defines, so that is kept. */
-static qp_quad crease_weight(const qp_local_mesh *m, const qp_local_edge *e) {
+static qp_quad crease_weight(const qp_piece *m, const qp_piece_edge *e) {
     float s = e->sharpness;
     if (s <= 0.0f) return 0;
-    if (qp_local_infinite(s)) return 1;
-    if (child_sharpness(m, &m->vertices[e->v[0]], s) > 0.0f && child_sharpness(m, &m->vertices[e->v[1]], s) > 0.0f)
+    if (qp_piece_infinite(s)) return 1;
+    if (child_sharpness(m, &m->vertices[e->v[0]], s) > 0.0f &&
+        child_sharpness(m, &m->vertices[e->v[1]], s) > 0.0f)
         return 1;
     return s;
 }
 
-static void smooth_edge_point(const qp_local_mesh *m, const qp_local_edge *e, const qp_local_mesh *child,
+static void smooth_edge_point(const qp_piece *m, const qp_piece_edge *e, const qp_piece *child,
                               qp_quad p[3]) {
     const qp_quad *a = m->vertices[e->v[0]].p, *b = m->vertices[e->v[1]].p;
     const qp_quad *f = child->vertices[m->map_face[e->f[0]]].p, *g = child->vertices[m->map_face[e->f[1]]].p;
-    bool tri_f = m->smooth_triangles && qp_local_face_size(m, e->f[0]) == 3;
-    bool tri_g = m->smooth_triangles && qp_local_face_size(m, e->f[1]) == 3;
+    bool tri_f = m->smooth_triangles && qp_piece_face_size(m, e->f[0]) == 3;
+    bool tri_g = m->smooth_triangles && qp_piece_face_size(m, e->f[1]) == 3;
     if (!tri_f && !tri_g) {
         for (int c = 0; c < 3; ++c) p[c] = (a[c] + b[c] + f[c] + g[c]) * 0.25;
         return;
     }
     /* Stam and Loop's remedy for triangles: 0.470 in place of 1/4 for a triangle's point. */
     qp_quad triangle = (qp_quad)47 / 100, quarter = 0.25;
-    qp_quad face = ((tri_f ? triangle : quarter) + (tri_g ? triangle : quarter)) / 2, vertex = (1 - 2 * face) / 2;
+    qp_quad face = ((tri_f ? triangle : quarter) + (tri_g ? triangle : quarter)) / 2,
+            vertex = (1 - 2 * face) / 2;
     for (int c = 0; c < 3; ++c) p[c] = vertex * (a[c] + b[c]) + face * (f[c] + g[c]);
 }
 
-static void edge_point(const qp_local_mesh *m, const qp_local_edge *e, const qp_local_mesh *child,
-                       qp_quad p[3]) {
+static void edge_point(const qp_piece *m, const qp_piece_edge *e, const qp_piece *child, qp_quad p[3]) {
     const qp_quad *a = m->vertices[e->v[0]].p, *b = m->vertices[e->v[1]].p;
     qp_quad w = crease_weight(m, e);
     if (w == 0 || w != 1) smooth_edge_point(m, e, child, p);
@@ -101,12 +102,12 @@ typedef struct transition {
     uint32_t count;
 } transition;
 
-static vertex_rule rule_of(const qp_local_mesh *m, uint32_t vertex, bool after, transition *t) {
+static vertex_rule rule_of(const qp_piece *m, uint32_t vertex, bool after, transition *t) {
     vertex_rule r = {RULE_SMOOTH, {QP_NONE, QP_NONE}};
-    const qp_local_vertex *v = &m->vertices[vertex];
+    const qp_piece_vertex *v = &m->vertices[vertex];
     uint32_t sharp = 0;
     for (uint32_t i = m->vertex_edge_offsets[vertex]; i < m->vertex_edge_offsets[vertex + 1]; ++i) {
-        const qp_local_edge *e = &m->edges[m->vertex_edges[i]];
+        const qp_piece_edge *e = &m->edges[m->vertex_edges[i]];
         float s = e->sharpness;
         if (s <= 0.0f) continue;
         float next = child_sharpness(m, v, s);
@@ -130,8 +131,8 @@ static vertex_rule rule_of(const qp_local_mesh *m, uint32_t vertex, bool after, 
     return r;
 }
 
-static void apply_rule(const qp_local_mesh *m, uint32_t vertex, const vertex_rule *r,
-                       const qp_local_mesh *child, qp_quad p[3]) {
+static void apply_rule(const qp_piece *m, uint32_t vertex, const vertex_rule *r, const qp_piece *child,
+                       qp_quad p[3]) {
     const qp_quad *v = m->vertices[vertex].p;
     if (r->rule == RULE_CORNER) {
         memcpy(p, v, 3 * sizeof *p);
@@ -145,7 +146,7 @@ static void apply_rule(const qp_local_mesh *m, uint32_t vertex, const vertex_rul
     uint32_t first = m->vertex_edge_offsets[vertex], n = m->vertex_edge_offsets[vertex + 1] - first;
     p[0] = p[1] = p[2] = 0;
     for (uint32_t i = 0; i < n; ++i) {
-        const qp_local_edge *e = &m->edges[m->vertex_edges[first + i]];
+        const qp_piece_edge *e = &m->edges[m->vertex_edges[first + i]];
         const qp_quad *end = m->vertices[e->v[e->v[0] == vertex]].p;
         for (int c = 0; c < 3; ++c) p[c] += end[c];
     }
@@ -161,7 +162,7 @@ static void apply_rule(const qp_local_mesh *m, uint32_t vertex, const vertex_rul
     }
 }
 
-static void vertex_point(const qp_local_mesh *m, uint32_t vertex, const qp_local_mesh *child, qp_quad p[3]) {
+static void vertex_point(const qp_piece *m, uint32_t vertex, const qp_piece *child, qp_quad p[3]) {
     transition before = {0, 0}, t = {0, 0};
     vertex_rule parent = rule_of(m, vertex, false, &before), next = rule_of(m, vertex, true, &t);
     apply_rule(m, vertex, &parent, child, p);
@@ -174,8 +175,7 @@ static void vertex_point(const qp_local_mesh *m, uint32_t vertex, const qp_local
 }
 
 /* Numbers the child's vertices: a point for each center, each face and each edge at one. */
-static void number_points(qp_local_mesh *m, const uint32_t *centers, uint32_t n_centers,
-                          qp_local_mesh *child) {
+static void number_points(qp_piece *m, const uint32_t *centers, uint32_t n_centers, qp_piece *child) {
     memset(m->map_vertex, 0xff, m->n_vertices * sizeof(uint32_t));
     memset(m->map_edge, 0xff, m->n_edges * sizeof(uint32_t));
     memset(m->map_face, 0xff, m->n_faces * sizeof(uint32_t));
@@ -196,7 +196,7 @@ static void number_points(qp_local_mesh *m, const uint32_t *centers, uint32_t n_
 }
 
 /* Positions, in the order of dependence, and the sharpness that lives at vertices. */
-static void make_points(const qp_local_mesh *m, qp_local_mesh *child) {
+static void make_points(const qp_piece *m, qp_piece *child) {
     qp_quad p[3];
     for (uint32_t f = 0; f < m->n_faces; ++f)
         if (m->map_face[f] != QP_NONE) {
@@ -205,13 +205,13 @@ static void make_points(const qp_local_mesh *m, qp_local_mesh *child) {
         }
     for (uint32_t e = 0; e < m->n_edges; ++e)
         if (m->map_edge[e] != QP_NONE) {
-            const qp_local_edge *edge = &m->edges[e];
+            const qp_piece_edge *edge = &m->edges[e];
             edge_point(m, edge, child, p);
             set_vertex(child, m->map_edge[e], p);
             /* Only the edge's own two children can be semi-sharp at its point. */
             for (int end = 0; end < 2; ++end) {
                 float s = child_sharpness(m, &m->vertices[edge->v[end]], edge->sharpness);
-                if (!qp_local_semisharp(s)) continue;
+                if (!qp_piece_semisharp(s)) continue;
                 child->vertices[m->map_edge[e]].semi_sum += s;
                 child->vertices[m->map_edge[e]].semi_count++;
             }
@@ -224,19 +224,19 @@ static void make_points(const qp_local_mesh *m, qp_local_mesh *child) {
         }
 }
 
-static uint32_t add_edge(qp_local_mesh *child, uint32_t a, uint32_t b, float sharpness) {
-    child->edges[child->n_edges] = (qp_local_edge){.v = {a, b}, .sharpness = sharpness};
+static uint32_t add_edge(qp_piece *child, uint32_t a, uint32_t b, float sharpness) {
+    child->edges[child->n_edges] = (qp_piece_edge){.v = {a, b}, .sharpness = sharpness};
     return child->n_edges++;
 }
 
 /* The child of an edge at a center. */
-static uint32_t half_edge(qp_local_mesh *m, uint32_t edge, uint32_t vertex, qp_local_mesh *child) {
-    const qp_local_edge *e = &m->edges[edge];
+static uint32_t half_edge(qp_piece *m, uint32_t edge, uint32_t vertex, qp_piece *child) {
+    const qp_piece_edge *e = &m->edges[edge];
     uint32_t *slot = &m->map_half[2 * edge + (e->v[1] == vertex)];
     if (*slot != QP_NONE) return *slot;
-    qp_local_vertex *v = &child->vertices[m->map_vertex[vertex]];
+    qp_piece_vertex *v = &child->vertices[m->map_vertex[vertex]];
     float s = child_sharpness(m, &m->vertices[vertex], e->sharpness);
-    if (qp_local_semisharp(s)) {
+    if (qp_piece_semisharp(s)) {
         v->semi_sum += s;
         v->semi_count++;
     }
@@ -244,16 +244,17 @@ static uint32_t half_edge(qp_local_mesh *m, uint32_t edge, uint32_t vertex, qp_l
 }
 
 /* The edge from the point of the edge after `corner` to the point of its face. */
-static uint32_t spoke(qp_local_mesh *m, uint32_t corner, qp_local_mesh *child) {
+static uint32_t spoke(qp_piece *m, uint32_t corner, qp_piece *child) {
     if (m->map_spoke[corner] == QP_NONE)
         m->map_spoke[corner] =
             add_edge(child, m->map_edge[m->corner_edge[corner]], m->map_face[m->corner_face[corner]], 0.0f);
     return m->map_spoke[corner];
 }
 
-static void add_child_face(qp_local_mesh *m, uint32_t corner, qp_local_mesh *child) {
-    uint32_t face = m->corner_face[corner], vertex = m->corner_vertex[corner], prev = qp_local_prev(m, corner);
-    uint32_t place = qp_local_face_size(m, face) == 4 ? corner - m->face_offsets[face] : 0;
+static void add_child_face(qp_piece *m, uint32_t corner, qp_piece *child) {
+    uint32_t face = m->corner_face[corner], vertex = m->corner_vertex[corner],
+             prev = qp_piece_prev(m, corner);
+    uint32_t place = qp_piece_face_size(m, face) == 4 ? corner - m->face_offsets[face] : 0;
     uint32_t v[4] = {m->map_vertex[vertex], m->map_edge[m->corner_edge[corner]], m->map_face[face],
                      m->map_edge[m->corner_edge[prev]]};
     uint32_t e[4] = {half_edge(m, m->corner_edge[corner], vertex, child), spoke(m, corner, child),
@@ -264,11 +265,11 @@ static void add_child_face(qp_local_mesh *m, uint32_t corner, qp_local_mesh *chi
         edges[(i + place) & 3] = e[i];
     }
     m->corner_child[corner] = child->n_faces;
-    qp_local_add_face(child, 4, vertices, edges);
+    qp_piece_add_face(child, 4, vertices, edges);
 }
 
-qp_status qp_local_refine(qp_local_mesh *parent, const uint32_t *centers, uint32_t n_centers,
-                          qp_local_mesh *child, qp_error *err) {
+qp_status qp_piece_refine(qp_piece *parent, const uint32_t *centers, uint32_t n_centers, qp_piece *child,
+                          qp_error *err) {
     size_t edges = 0, faces = 0;
     for (uint32_t i = 0; i < n_centers; ++i) {
         uint32_t v = centers[i];
@@ -276,7 +277,7 @@ qp_status qp_local_refine(qp_local_mesh *parent, const uint32_t *centers, uint32
         faces += parent->vertex_corner_offsets[v + 1] - parent->vertex_corner_offsets[v];
     }
     qp_status status =
-        qp_local_reserve(child, n_centers + edges + faces, edges + 2 * faces, faces, 4 * faces, err);
+        qp_piece_reserve(child, n_centers + edges + faces, edges + 2 * faces, faces, 4 * faces, err);
     if (status) return status;
     child->chaikin = parent->chaikin;
     child->smooth_triangles = false;
@@ -286,6 +287,6 @@ qp_status qp_local_refine(qp_local_mesh *parent, const uint32_t *centers, uint32
         for (uint32_t k = parent->vertex_corner_offsets[centers[i]];
              k < parent->vertex_corner_offsets[centers[i] + 1]; ++k)
             add_child_face(parent, parent->vertex_corners[k], child);
-    qp_local_index(child);
+    qp_piece_index(child);
     return QP_OK;
 }

@@ -1,51 +1,51 @@
-/* Local meshes: memory, gathering from the base mesh, incidence and walks. */
-#include "host/reference/local.h"
+/* Pieces: memory, gathering from the base mesh, incidence and walks. */
+#include "host/reference/piece.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#include "host/reference/local_build.h"
+#include "host/reference/piece_build.h"
 
-void qp_local_free(qp_local_mesh *local) {
-    free(local->block);
-    memset(local, 0, sizeof *local);
+void qp_piece_free(qp_piece *piece) {
+    free(piece->block);
+    memset(piece, 0, sizeof *piece);
 }
 
 /* Hands out consecutive aligned pieces of one block; with base NULL it only measures. */
-static void *piece(unsigned char *base, size_t *used, size_t count, size_t size) {
+static void *cut(unsigned char *base, size_t *used, size_t count, size_t size) {
     void *at = base ? base + *used : NULL;
     *used += (count * size + 15) & ~(size_t)15;
     return at;
 }
 
-static size_t lay_out(qp_local_mesh *m, unsigned char *base, size_t nv, size_t ne, size_t nf, size_t nc) {
+static size_t lay_out(qp_piece *m, unsigned char *base, size_t nv, size_t ne, size_t nf, size_t nc) {
     size_t used = 0, word = sizeof(uint32_t);
-    m->vertices = piece(base, &used, nv, sizeof *m->vertices);
-    m->edges = piece(base, &used, ne, sizeof *m->edges);
-    m->face_offsets = piece(base, &used, nf + 1, word);
-    m->corner_face = piece(base, &used, nc, word);
-    m->corner_vertex = piece(base, &used, nc, word);
-    m->corner_edge = piece(base, &used, nc, word);
-    m->vertex_edge_offsets = piece(base, &used, nv + 1, word);
-    m->vertex_edges = piece(base, &used, 2 * ne, word);
-    m->vertex_corner_offsets = piece(base, &used, nv + 1, word);
-    m->vertex_corners = piece(base, &used, nc, word);
-    m->corner_child = piece(base, &used, nc, word);
-    m->map_vertex = piece(base, &used, nv, word);
-    m->map_edge = piece(base, &used, ne, word);
-    m->map_face = piece(base, &used, nf, word);
-    m->map_half = piece(base, &used, 2 * ne, word);
-    m->map_spoke = piece(base, &used, nc, word);
+    m->vertices = cut(base, &used, nv, sizeof *m->vertices);
+    m->edges = cut(base, &used, ne, sizeof *m->edges);
+    m->face_offsets = cut(base, &used, nf + 1, word);
+    m->corner_face = cut(base, &used, nc, word);
+    m->corner_vertex = cut(base, &used, nc, word);
+    m->corner_edge = cut(base, &used, nc, word);
+    m->vertex_edge_offsets = cut(base, &used, nv + 1, word);
+    m->vertex_edges = cut(base, &used, 2 * ne, word);
+    m->vertex_corner_offsets = cut(base, &used, nv + 1, word);
+    m->vertex_corners = cut(base, &used, nc, word);
+    m->corner_child = cut(base, &used, nc, word);
+    m->map_vertex = cut(base, &used, nv, word);
+    m->map_edge = cut(base, &used, ne, word);
+    m->map_face = cut(base, &used, nf, word);
+    m->map_half = cut(base, &used, 2 * ne, word);
+    m->map_spoke = cut(base, &used, nc, word);
     return used;
 }
 
-qp_status qp_local_reserve(qp_local_mesh *m, size_t nv, size_t ne, size_t nf, size_t nc, qp_error *err) {
+qp_status qp_piece_reserve(qp_piece *m, size_t nv, size_t ne, size_t nf, size_t nc, qp_error *err) {
     size_t need = lay_out(m, NULL, nv, ne, nf, nc);
     if (need > m->block_bytes) {
         free(m->block);
         m->block_bytes = 0;
         m->block = qp_alloc(2, need, false);
-        if (!m->block) return qp_fail_memory(err, 2 * need, "a local mesh of the reference");
+        if (!m->block) return qp_fail_memory(err, 2 * need, "a piece of the reference");
         m->block_bytes = 2 * need;
     }
     lay_out(m, m->block, nv, ne, nf, nc);
@@ -54,14 +54,14 @@ qp_status qp_local_reserve(qp_local_mesh *m, size_t nv, size_t ne, size_t nf, si
     return QP_OK;
 }
 
-void qp_local_add_face(qp_local_mesh *m, uint32_t size, const uint32_t *vertices, const uint32_t *edges) {
+void qp_piece_add_face(qp_piece *m, uint32_t size, const uint32_t *vertices, const uint32_t *edges) {
     uint32_t f = m->n_faces++;
     for (uint32_t i = 0; i < size; ++i) {
         uint32_t h = m->n_corners++;
         m->corner_face[h] = f;
         m->corner_vertex[h] = vertices[i];
         m->corner_edge[h] = edges[i];
-        qp_local_edge *e = &m->edges[edges[i]];
+        qp_piece_edge *e = &m->edges[edges[i]];
         if (e->n_faces < 2) e->f[e->n_faces] = f;
         e->n_faces++;
     }
@@ -69,7 +69,7 @@ void qp_local_add_face(qp_local_mesh *m, uint32_t size, const uint32_t *vertices
 }
 
 /* Counts, then places; leaves offsets[i] at the start of item i's list. */
-void qp_local_index(qp_local_mesh *m) {
+void qp_piece_index(qp_piece *m) {
     uint32_t *eo = m->vertex_edge_offsets, *co = m->vertex_corner_offsets;
     memset(eo, 0, (m->n_vertices + 1) * sizeof *eo);
     memset(co, 0, (m->n_vertices + 1) * sizeof *co);
@@ -89,23 +89,23 @@ void qp_local_index(qp_local_mesh *m) {
     for (uint32_t h = m->n_corners; h-- > 0;) m->vertex_corners[--co[m->corner_vertex[h]]] = h;
 }
 
-qp_local_kind qp_local_vertex_kind(const qp_local_mesh *m, uint32_t vertex) {
-    qp_local_kind k = {0, 0, 0, 0, true};
+qp_piece_kind qp_piece_vertex_kind(const qp_piece *m, uint32_t vertex) {
+    qp_piece_kind k = {0, 0, 0, 0, true};
     const uint32_t *eo = m->vertex_edge_offsets, *co = m->vertex_corner_offsets;
     k.n_edges = eo[vertex + 1] - eo[vertex];
     k.n_faces = co[vertex + 1] - co[vertex];
     for (uint32_t i = eo[vertex]; i < eo[vertex + 1]; ++i) {
         float s = m->edges[m->vertex_edges[i]].sharpness;
-        k.n_infinite += qp_local_infinite(s);
-        k.n_semisharp += qp_local_semisharp(s);
+        k.n_infinite += qp_piece_infinite(s);
+        k.n_semisharp += qp_piece_semisharp(s);
     }
     for (uint32_t i = co[vertex]; i < co[vertex + 1]; ++i)
-        k.quads = k.quads && qp_local_face_size(m, m->corner_face[m->vertex_corners[i]]) == 4;
+        k.quads = k.quads && qp_piece_face_size(m, m->corner_face[m->vertex_corners[i]]) == 4;
     return k;
 }
 
-uint32_t qp_local_across(const qp_local_mesh *m, uint32_t corner, uint32_t edge) {
-    const qp_local_edge *e = &m->edges[edge];
+uint32_t qp_piece_across(const qp_piece *m, uint32_t corner, uint32_t edge) {
+    const qp_piece_edge *e = &m->edges[edge];
     if (e->n_faces != 2) return QP_NONE;
     uint32_t face = e->f[0] == m->corner_face[corner] ? e->f[1] : e->f[0];
     for (uint32_t h = m->face_offsets[face]; h < m->face_offsets[face + 1]; ++h)
@@ -132,10 +132,10 @@ static uint32_t place_of(const uint32_t *list, uint32_t count, uint32_t value) {
 }
 
 /* Every semi-sharp edge has two faces that run opposite ways, so it leaves each of its ends exactly once. */
-static void sum_semisharp(const qp_mesh *mesh, uint32_t vertex, qp_local_vertex *out) {
+static void sum_semisharp(const qp_mesh *mesh, uint32_t vertex, qp_piece_vertex *out) {
     for (uint32_t i = mesh->vertex_offsets[vertex]; i < mesh->vertex_offsets[vertex + 1]; ++i) {
         float s = mesh->edge_sharpness[mesh->corner_edge[mesh->vertex_corners[i]]];
-        if (!qp_local_semisharp(s)) continue;
+        if (!qp_piece_semisharp(s)) continue;
         out->semi_sum += s;
         out->semi_count++;
     }
@@ -170,37 +170,37 @@ typedef struct gather {
     uint32_t *faces, *vertices, *edges, n_faces, n_vertices, n_edges, n_corners, max_size;
 } gather;
 
-static void fill(const gather *g, const double *positions, qp_local_mesh *local, uint32_t *scratch) {
+static void fill(const gather *g, const double *positions, qp_piece *piece, uint32_t *scratch) {
     const qp_mesh *mesh = g->mesh;
     for (uint32_t i = 0; i < g->n_vertices; ++i) {
-        qp_local_vertex *v = &local->vertices[i];
+        qp_piece_vertex *v = &piece->vertices[i];
         uint32_t from = g->vertices[i];
         for (int c = 0; c < 3; ++c) v->p[c] = positions[3 * (size_t)from + c];
         v->sharpness = mesh->vertex_sharpness[from];
         v->semi_sum = 0;
         v->semi_count = 0;
-        if (local->chaikin) sum_semisharp(mesh, from, v);
+        if (piece->chaikin) sum_semisharp(mesh, from, v);
     }
     for (uint32_t i = 0; i < g->n_edges; ++i) {
         const uint32_t *ends = mesh->edge_vertices + 2 * (size_t)g->edges[i];
-        local->edges[i] = (qp_local_edge){.v = {place_of(g->vertices, g->n_vertices, ends[0]),
+        piece->edges[i] = (qp_piece_edge){.v = {place_of(g->vertices, g->n_vertices, ends[0]),
                                                 place_of(g->vertices, g->n_vertices, ends[1])},
                                           .sharpness = mesh->edge_sharpness[g->edges[i]]};
     }
-    local->n_vertices = g->n_vertices;
-    local->n_edges = g->n_edges;
+    piece->n_vertices = g->n_vertices;
+    piece->n_edges = g->n_edges;
     for (uint32_t i = 0; i < g->n_faces; ++i) {
         uint32_t first = mesh->face_offsets[g->faces[i]], size = qp_face_size(mesh, g->faces[i]);
         for (uint32_t k = 0; k < size; ++k) {
             scratch[k] = place_of(g->vertices, g->n_vertices, mesh->face_vertices[first + k]);
             scratch[g->max_size + k] = place_of(g->edges, g->n_edges, mesh->corner_edge[first + k]);
         }
-        qp_local_add_face(local, size, scratch, scratch + g->max_size);
+        qp_piece_add_face(piece, size, scratch, scratch + g->max_size);
     }
-    qp_local_index(local);
+    qp_piece_index(piece);
 }
 
-static qp_status collect_and_fill(gather *g, const double *positions, qp_local_mesh *local, qp_error *err) {
+static qp_status collect_and_fill(gather *g, const double *positions, qp_piece *piece, qp_error *err) {
     const qp_mesh *mesh = g->mesh;
     for (uint32_t i = 0; i < g->n_faces; ++i) {
         uint32_t size = qp_face_size(mesh, g->faces[i]);
@@ -219,18 +219,18 @@ static qp_status collect_and_fill(gather *g, const double *positions, qp_local_m
         }
     g->n_vertices = sort_unique(g->vertices, n);
     g->n_edges = sort_unique(g->edges, n);
-    if (qp_local_reserve(local, g->n_vertices, g->n_edges, g->n_faces, n, err)) return QP_SYSTEM;
-    fill(g, positions, local, g->edges + g->n_corners);
+    if (qp_piece_reserve(piece, g->n_vertices, g->n_edges, g->n_faces, n, err)) return QP_SYSTEM;
+    fill(g, positions, piece, g->edges + g->n_corners);
     return QP_OK;
 }
 
-qp_status qp_local_gather(const qp_mesh *mesh, const double *positions, uint32_t face, qp_local_mesh *local,
+qp_status qp_piece_gather(const qp_mesh *mesh, const double *positions, uint32_t face, qp_piece *piece,
                           qp_error *err) {
     gather g = {.mesh = mesh};
-    local->chaikin = mesh->crease_method == QP_CREASE_CHAIKIN;
-    local->smooth_triangles = mesh->triangle_rule == QP_TRIANGLE_SMOOTH;
+    piece->chaikin = mesh->crease_method == QP_CREASE_CHAIKIN;
+    piece->smooth_triangles = mesh->triangle_rule == QP_TRIANGLE_SMOOTH;
     qp_status status = collect_faces(mesh, face, &g.faces, &g.n_faces, err);
-    if (!status) status = collect_and_fill(&g, positions, local, err);
+    if (!status) status = collect_and_fill(&g, positions, piece, err);
     free(g.vertices);
     free(g.faces);
     return status;

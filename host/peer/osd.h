@@ -1,0 +1,40 @@
+/* OpenSubdiv 3.5 behind a C face: its evaluation in double, for cross-checks, and its set-up times. */
+#ifndef QP_PEER_OSD_H
+#define QP_PEER_OSD_H
+
+#include "host/mesh/mesh.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct qp_osd qp_osd;
+
+typedef struct qp_osd_sample {
+    double p[3], du[3], dv[3]; /* derivatives by the (u,v) of OpenSubdiv's ptex face, see qp_osd_eval */
+    bool end_cap;              /* inside a Gregory patch: an approximation of the surface */
+    bool missing;              /* no patch there: a hole */
+} qp_osd_sample;
+
+/* Refines the mesh adaptively to `depth` (1..10) and makes its patch table and points in double. The mesh
+ * goes over with its tags as given, not as made effective. Single-crease patches are off and infinitely
+ * sharp patches on: those are exact, the others are not. positions: 3 a vertex, copied. QP_BAD_INPUT when
+ * OpenSubdiv refuses the mesh, QP_SYSTEM when it throws. The caller frees *osd. */
+qp_status qp_osd_create(const qp_mesh *mesh, const double *positions, unsigned depth, qp_osd **osd,
+                        qp_error *err);
+void qp_osd_free(qp_osd *osd);
+
+/* The limit at count points of one patch (numbered as ours), uv two a point. On children of n-gons its
+ * derivatives are twice ours: it measures them by half the parameter. */
+qp_status qp_osd_eval(const qp_osd *osd, uint32_t patch, size_t count, const double *uv,
+                      qp_osd_sample *samples, qp_error *err);
+
+/* Milliseconds of adaptive refinement to `level`, of the patch table with B-spline end caps, and of the
+ * stencil table of all points, in float, as a program would set it up; topology only. One run. */
+qp_status qp_osd_time_setup(const qp_mesh *mesh, unsigned level, double *refine_ms, double *patch_ms,
+                            double *stencil_ms, qp_error *err);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
