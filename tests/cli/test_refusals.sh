@@ -1,0 +1,67 @@
+# Bad usage, bad input, devices and files that are not there: exit code, one line, nothing half written.
+source "$(dirname "$0")/common.sh"
+cube=$work/cube.obj
+run gen cube -o "$cube"
+
+refuses "no subcommand" 2 "no subcommand"
+refuses "unknown subcommand" 2 "unknown subcommand 'frobnicate'" frobnicate
+for subcommand in info gen eval error render devices; do
+    refuses "$subcommand, unknown option" 2 "unknown option '--frobnicate'" "$subcommand" --frobnicate
+done
+refuses "no mesh" 2 "MESH is missing" info
+refuses "two meshes" 2 "unexpected argument" info "$cube" "$cube"
+refuses "value missing" 2 "needs a value" eval "$cube" --tess
+for number in nan inf 1e999 0 65 -1 "" 4x 0x10; do
+    refuses "bad factor '$number'" 2 "not a number from 1 to 64" eval "$cube" --tess "$number"
+done
+refuses "bad spacing" 2 "none of equal" eval "$cube" --spacing odd
+refuses "bad repeat" 2 "whole number" eval "$cube" --repeat 1.5
+refuses "bad depth" 2 "whole number from 1 to 12" info "$cube" --depth 13
+refuses "flag with a value" 2 "takes no value" info "$cube" --json=1
+refuses "unknown kind" 2 "icosahedron" gen icosahedron -o "$work/x.obj"
+refuses "unknown kind in a mesh argument" 2 "icosahedron" info gen:icosahedron
+refuses "bad setting in a mesh argument" 2 "'n=-4' is not a setting" info gen:torus,n=-4
+refuses "gen without -o" 2 "gen needs -o" gen cube
+refuses "missing file" 2 "nowhere.obj: " info "$work/nowhere.obj"
+refuses "a folder" 2 "$work" info "$work"
+refuses "missing scene" 2 "nowhere.json: " render "$work/nowhere.json" -o "$work/x.png"
+refuses "unknown picture" 2 "x.gif" render "$work/nowhere.json" -o "$work/x.gif"
+refuses "unknown stream" 2 "x.stl" eval "$cube" -o "$work/x.stl"
+
+printf 'v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 4\n' >"$work/range.obj"
+refuses "index out of range" 2 "range.obj:4: " info "$work/range.obj"
+printf 'v 0 0 nan\n' >"$work/nan.obj"
+refuses "NaN" 2 "nan.obj:1: " info "$work/nan.obj"
+printf 'v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2\n' >"$work/two.obj"
+refuses "a face of two" 2 "two.obj:4: " info "$work/two.obj"
+: >"$work/empty.obj"
+refuses "empty file" 2 "empty.obj" info "$work/empty.obj"
+printf '{"mesh": ' >"$work/half.json"
+refuses "half a scene" 2 "half.json" render "$work/half.json" -o "$work/x.png"
+
+refuses "no such device" 3 "nonesuch" eval "$cube" --device nonesuch
+export OCL_ICD_VENDORS=$work/no-vendors
+refuses "no OpenCL device" 3 "OpenCL" eval "$cube"
+run eval "$cube" --device host --json
+check "host needs no OpenCL device" [ "$code" -eq 0 ]
+run devices
+check "devices without OpenCL" [ "$code" -eq 0 ]
+unset OCL_ICD_VENDORS
+
+before=$(find "$work" | sort)
+refuses "folder missing" 3 "nowhere/x.obj: " gen cube -o "$work/nowhere/x.obj"
+refuses "disk full" 3 "/dev/full: " eval "$cube" --device host -o /dev/full
+cp "$cube" "$work/kept.obj"
+before=$(find "$work" | sort)
+# A file size limit stands in for a disk that fills up half-way.
+(
+    ulimit -f 4
+    trap '' XFSZ
+    "$QUADPLAN_PROGRAM" eval "$cube" --device host --tess 64 -o "$work/kept.obj" >/dev/null 2>"$work/limited"
+    echo $? >>"$work/limited"
+)
+check "write error: exit 3" [ "$(tail -n 1 "$work/limited")" -eq 3 ]
+check "write error: the old file is kept" cmp "$cube" "$work/kept.obj"
+rm "$work/limited"
+check "nothing half written" [ "$(find "$work" | sort)" = "$before" ]
+finish

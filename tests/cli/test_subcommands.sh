@@ -1,0 +1,99 @@
+# Every subcommand: help, JSON keys, outputs, exit codes.
+source "$(dirname "$0")/common.sh"
+cube=$work/cube.obj
+
+run --help
+check "help" [ "$code" -eq 0 ]
+check "help names the subcommands" grep -q devices "$work/stdout"
+run --version
+check "version" grep -qE '^quadplan [0-9]+\.[0-9]+\.[0-9]+$' "$work/stdout"
+for subcommand in info gen eval error render devices; do
+    run "$subcommand" --help
+    check "$subcommand --help" [ "$code" -eq 0 ]
+    check "$subcommand --help names --json" grep -q -- --json "$work/stdout"
+    check "$subcommand --help is quiet" [ ! -s "$work/stderr" ]
+done
+
+run gen cube -o "$cube" --json
+check "gen" [ "$code" -eq 0 ]
+keys gen vertices faces
+for kind in torus creased-torus cubes fan prism terrain random-closed random-open; do
+    run gen "$kind" -o "$work/$kind.obj"
+    check "gen $kind" [ "$code" -eq 0 ]
+    check "gen $kind writes" [ -s "$work/$kind.obj" ]
+done
+run gen random-open --seed 5 --faces 50 -o "$work/a.obj"
+run gen random-open --seed 5 --faces 50 -o "$work/b.obj"
+check "a seed fixes a mesh" cmp "$work/a.obj" "$work/b.obj"
+run gen random-open --seed 6 --faces 50 -o "$work/b.obj"
+check "another seed makes another mesh" test "$(cmp -s "$work/a.obj" "$work/b.obj"; echo $?)" -eq 1
+
+run info "$cube" --json
+check "info" [ "$code" -eq 0 ]
+keys info vertices faces patches regular_faces irregular_faces irregular_patches plans nodes stencils \
+    quadtree_bytes stencil_bytes control_points unique_control_points scratch_bytes build_ms
+value 'o["vertices"] == 8 and o["faces"] == 6 and o["patches"] == 6 and o["irregular_patches"] == 6'
+value 'o["plans"] == 1 and len(o["control_points"]) == 7 and len(o["unique_control_points"]) == 7'
+run info gen:torus --json
+value 'o["plans"] == 1 and o["regular_faces"] == o["faces"]'
+
+for device in "" host; do
+    run eval "$cube" --tess 8 --repeat 3 --device "$device" --json
+    check "eval" [ "$code" -eq 0 ]
+    keys eval patches samples triangles hull_ms domain_ms frame_ms samples_per_second memset_ratio \
+        peak_support_bytes stream_hash device
+    value 'o["samples"] == 6 * 81 and o["triangles"] == 6 * 128'
+    cp "$work/stdout" "$work/eval$device.json"
+done
+check "host and device: the same bits" python3 -c '
+import json, sys
+a, b = (json.load(open(f))["stream_hash"] for f in sys.argv[1:])
+sys.exit(a != b)' "$work/eval.json" "$work/evalhost.json"
+
+run eval "$cube" --tess 4 --device host -o "$work/out.obj"
+check "eval -o obj" [ "$(grep -c '^v ' "$work/out.obj")" -eq 150 ]
+check "eval -o obj triangles" [ "$(grep -c '^f ' "$work/out.obj")" -eq 192 ]
+run info "$work/out.obj" --json
+check "eval's obj reads back" [ "$code" -eq 0 ]
+value 'o["faces"] == 192'
+for precision in float double; do
+    run eval "$cube" --tess 4 --device host --precision "$precision" -o "$work/out.npy"
+    check "eval -o npy" [ "$code" -eq 0 ]
+    run eval "$cube" --tess 4 --device host --precision "$precision" -o "$work/out.ply"
+    check "eval -o ply" [ "$code" -eq 0 ]
+    check "npy and ply hold the stream" python3 -c '
+import ast, struct, sys
+folder, letter, size = sys.argv[1], *(("f", 4) if sys.argv[2] == "float" else ("d", 8))
+npy = open(folder + "/out.npy", "rb").read()
+assert npy[:8] == b"\x93NUMPY\x01\x00"
+length = struct.unpack("<H", npy[8:10])[0]
+header = ast.literal_eval(npy[10:10 + length].decode())
+assert (10 + length) % 64 == 0 and header["shape"] == (150, 6) and header["descr"] == "<f%d" % size, header
+data = npy[10 + length:]
+values = struct.unpack("<%d%s" % (150 * 6, letter), data)
+for i in range(0, 900, 6):
+    assert abs(sum(x * x for x in values[i + 3:i + 6]) - 1) < 1e-5
+    assert 0 < sum(x * x for x in values[i:i + 3])
+ply = open(folder + "/out.ply", "rb").read()
+end = ply.index(b"end_header\n") + 11
+assert ply[end:end + len(data)] == data
+assert len(ply) == end + len(data) + 192 * 13' "$work" "$precision"
+done
+
+run error "$cube" --tess 4 --device host --json
+check "error" [ "$code" -eq 0 ]
+keys error samples position_max position_rms normal_max_deg normal_rms_deg worst
+value 'sorted(o["worst"]) == ["patch", "u", "v"] and 0 < o["position_max"] < 1e-6 and o["normal_max_deg"] < 0.05'
+run error "$cube" --set random --samples 500 --seed 3 --device host --json
+value 'o["samples"] == 500'
+run error "$cube" --set corner --device host --json
+check "error --set corner" [ "$code" -eq 0 ]
+run error "$cube" --tess 4 --device host --max-position 0 --json
+check "error above a threshold: exit 1" [ "$code" -eq 1 ]
+check "error above a threshold: one line" one_line
+keys "error above a threshold" position_max
+
+run devices --json
+check "devices" [ "$code" -eq 0 ]
+value 'any(d["id"] == "host" for d in o["devices"])'
+finish
