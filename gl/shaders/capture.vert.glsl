@@ -1,0 +1,4 @@
+// A patch of one vertex that carries nothing.
+void main() {
+    gl_Position = vec4(0.0, 0.0, 0.0, 1.0);
+}
