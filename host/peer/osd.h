@@ -2,11 +2,11 @@
 #ifndef QP_PEER_OSD_H
 #define QP_PEER_OSD_H
 
-#include "host/mesh/mesh.h"
-
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+#include "host/mesh/mesh.h" /* inside: the house's own headers are plain C */
 
 typedef struct qp_osd qp_osd;
 
