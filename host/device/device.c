@@ -1,0 +1,217 @@
+/* Which devices there are, and opening one of them. */
+#include "host/device/opencl.h"
+
+#include <ctype.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+typedef struct found_device {
+    qp_device_info info;
+    cl_platform_id platform;
+    cl_device_id id;
+} found_device;
+
+static void device_text(cl_device_id id, cl_device_info what, char *text, size_t size) {
+    if (clGetDeviceInfo(id, what, size, text, NULL) != CL_SUCCESS) snprintf(text, size, "?");
+    text[size - 1] = '\0';
+    for (char *c = text; *c != '\0'; ++c) {
+        if ((unsigned char)*c < 0x20) *c = ' ';
+    }
+}
+
+static void describe_device(cl_platform_id platform, uint32_t p, cl_device_id id, uint32_t d,
+                            found_device *found) {
+    qp_device_info *info = &found->info;
+    cl_device_fp_config single = 0, doubles = 0;
+    cl_device_type type = 0;
+    cl_uint units = 0;
+    cl_ulong memory = 0, largest = 0;
+    *found = (found_device){.platform = platform, .id = id};
+    snprintf(info->id, sizeof info->id, "%u.%u", p, d);
+    device_text(id, CL_DEVICE_NAME, info->name, sizeof info->name);
+    device_text(id, CL_DEVICE_VERSION, info->version, sizeof info->version);
+    if (clGetPlatformInfo(platform, CL_PLATFORM_NAME, sizeof info->platform, info->platform, NULL) !=
+        CL_SUCCESS)
+        snprintf(info->platform, sizeof info->platform, "?");
+    /* A query that fails leaves its zero: no double, no correct rounding. */
+    clGetDeviceInfo(id, CL_DEVICE_SINGLE_FP_CONFIG, sizeof single, &single, NULL);
+    clGetDeviceInfo(id, CL_DEVICE_DOUBLE_FP_CONFIG, sizeof doubles, &doubles, NULL);
+    clGetDeviceInfo(id, CL_DEVICE_TYPE, sizeof type, &type, NULL);
+    clGetDeviceInfo(id, CL_DEVICE_MAX_COMPUTE_UNITS, sizeof units, &units, NULL);
+    clGetDeviceInfo(id, CL_DEVICE_GLOBAL_MEM_SIZE, sizeof memory, &memory, NULL);
+    clGetDeviceInfo(id, CL_DEVICE_MAX_MEM_ALLOC_SIZE, sizeof largest, &largest, NULL);
+    info->has_double = doubles != 0;
+    info->is_cpu = (type & CL_DEVICE_TYPE_CPU) != 0;
+    info->rounds_correctly = (single & CL_FP_CORRECTLY_ROUNDED_DIVIDE_SQRT) != 0;
+    info->compute_units = units;
+    info->memory_bytes = memory;
+    info->max_buffer_bytes = largest;
+}
+
+static void describe_host(qp_device_info *info) {
+    *info = (qp_device_info){.has_double = true, .is_cpu = true, .rounds_correctly = true};
+    snprintf(info->id, sizeof info->id, "host");
+    snprintf(info->name, sizeof info->name, "host");
+    snprintf(info->platform, sizeof info->platform, "quadplan");
+    snprintf(info->version, sizeof info->version, "kernels compiled as C");
+    info->compute_units = qp_thread_count();
+    long pages = sysconf(_SC_PHYS_PAGES), page = sysconf(_SC_PAGESIZE);
+    info->memory_bytes = pages > 0 && page > 0 ? (uint64_t)pages * (uint64_t)page : 0;
+    info->max_buffer_bytes = SIZE_MAX / 2;
+}
+
+/* Every OpenCL device in platform order; a system without OpenCL has none. */
+static qp_status find_devices(found_device **list, size_t *count, qp_error *err) {
+    cl_platform_id platforms[64];
+    cl_uint n_platforms = 0;
+    size_t capacity = 0;
+    *list = NULL;
+    *count = 0;
+    if (clGetPlatformIDs(64, platforms, &n_platforms) != CL_SUCCESS) return QP_OK;
+    if (n_platforms > 64) n_platforms = 64;
+    for (cl_uint p = 0; p < n_platforms; ++p) {
+        cl_device_id devices[64];
+        cl_uint n_devices = 0;
+        if (clGetDeviceIDs(platforms[p], CL_DEVICE_TYPE_ALL, 64, devices, &n_devices) != CL_SUCCESS) continue;
+        if (n_devices > 64) n_devices = 64;
+        if (!qp_grow((void **)list, &capacity, *count + n_devices, sizeof **list)) {
+            free(*list);
+            *list = NULL;
+            return qp_fail_memory(err, (*count + n_devices) * sizeof **list, "the list of devices");
+        }
+        for (cl_uint d = 0; d < n_devices; ++d)
+            describe_device(platforms[p], p, devices[d], d, &(*list)[(*count)++]);
+    }
+    return QP_OK;
+}
+
+qp_status qp_device_list(qp_device_info **list, size_t *count, qp_error *err) {
+    found_device *found = NULL;
+    size_t n = 0;
+    qp_status status = find_devices(&found, &n, err);
+    if (status != QP_OK) return status;
+    *list = qp_alloc(n + 1, sizeof **list, true);
+    if (*list == NULL) {
+        free(found);
+        return qp_fail_memory(err, (n + 1) * sizeof **list, "the list of devices");
+    }
+    for (size_t i = 0; i < n; ++i) (*list)[i] = found[i].info;
+    describe_host(&(*list)[n]);
+    *count = n + 1;
+    free(found);
+    return QP_OK;
+}
+
+/* Is `part` in `text`, whatever the case? */
+static bool contains(const char *text, const char *part) {
+    size_t n = strlen(part);
+    for (; *text != '\0'; ++text) {
+        size_t i = 0;
+        while (i < n && tolower((unsigned char)text[i]) == tolower((unsigned char)part[i])) ++i;
+        if (i == n) return true;
+    }
+    return false;
+}
+
+static qp_status open_queue(qp_device *device, cl_platform_id platform, qp_error *err) {
+    cl_int code;
+    const cl_context_properties properties[] = {CL_CONTEXT_PLATFORM, (cl_context_properties)platform, 0};
+    device->context = clCreateContext(properties, 1, &device->id, NULL, NULL, &code);
+    if (code != CL_SUCCESS) return qp_cl_check(code, "clCreateContext", device, err);
+    device->queue = clCreateCommandQueue(device->context, device->id, CL_QUEUE_PROFILING_ENABLE, &code);
+    return qp_cl_check(code, "clCreateCommandQueue", device, err);
+}
+
+/* The register width in elements, where a work-item has vector registers to itself. */
+static uint32_t native_lanes(const qp_device *device, cl_device_info what, uint32_t largest) {
+    cl_uint width = 1;
+    if (!device->info.is_cpu || clGetDeviceInfo(device->id, what, sizeof width, &width, NULL) != CL_SUCCESS)
+        return 1;
+    uint32_t lanes = 1;
+    while (lanes * 2 <= width && lanes < largest) lanes *= 2;
+    return lanes == 2 ? 4 : lanes; /* widths of two are not worth their shuffles */
+}
+
+/* The device that `which` means, among n; NULL when there is none such. */
+static const found_device *choose(const found_device *found, size_t n, const char *which) {
+    if (which[0] == '\0') return n == 0 ? NULL : &found[0];
+    for (size_t i = 0; i < n; ++i) {
+        if (strcmp(found[i].info.id, which) == 0) return &found[i];
+    }
+    for (size_t i = 0; i < n; ++i) {
+        if (contains(found[i].info.name, which)) return &found[i];
+    }
+    return NULL;
+}
+
+qp_status qp_device_open(const char *which, qp_device **device, qp_error *err) {
+    *device = NULL;
+    if (which == NULL || which[0] == '\0') {
+        which = getenv("QUADPLAN_DEVICE");
+        if (which == NULL) which = "";
+    }
+    qp_device *d = qp_alloc(1, sizeof *d, true);
+    if (d == NULL) return qp_fail_memory(err, sizeof *d, "a device");
+    if (strcmp(which, "host") == 0) {
+        d->host = true;
+        describe_host(&d->info);
+        *device = d;
+        return QP_OK;
+    }
+    found_device *found = NULL;
+    size_t n = 0;
+    qp_status status = find_devices(&found, &n, err);
+    if (status == QP_OK) {
+        const found_device *chosen = choose(found, n, which);
+        if (chosen != NULL) {
+            d->info = chosen->info;
+            d->id = chosen->id;
+            status = open_queue(d, chosen->platform, err);
+        } else if (n == 0) {
+            status =
+                qp_fail(err, QP_SYSTEM,
+                        "no OpenCL device found (install pocl-opencl-icd, or choose the device \"host\")");
+        } else {
+            status = qp_fail(err, QP_SYSTEM, "no OpenCL device is called '%s' (see quadplan devices)", which);
+        }
+    }
+    free(found);
+    if (status != QP_OK) {
+        qp_device_free(d);
+        return status;
+    }
+    d->lanes_float = native_lanes(d, CL_DEVICE_NATIVE_VECTOR_WIDTH_FLOAT, 16);
+    d->lanes_double = native_lanes(d, CL_DEVICE_NATIVE_VECTOR_WIDTH_DOUBLE, 8);
+    *device = d;
+    return QP_OK;
+}
+
+void qp_device_free(qp_device *device) {
+    if (device == NULL) return;
+    if (device->queue != NULL) {
+        clFinish(device->queue);
+        clReleaseCommandQueue(device->queue);
+    }
+    for (size_t i = 0; i < device->n_pending; ++i) clReleaseEvent(device->pending[i].event);
+    free(device->pending);
+    if (device->context != NULL) clReleaseContext(device->context);
+    free(device);
+}
+
+const char *qp_device_name(const qp_device *device) {
+    return device->info.name;
+}
+
+int qp_device_has_double(const qp_device *device) {
+    return device->info.has_double;
+}
+
+const qp_device_info *qp_device_get_info(const qp_device *device) {
+    return &device->info;
+}
+
+bool qp_device_is_host(const qp_device *device) {
+    return device->host;
+}

@@ -1,0 +1,11 @@
+/* The kernels for any processor; fma may be a call of the C library here. */
+#define QP_HOST_TABLE qp_host_kernels_any
+#include "host/device/host_kernels_body.h"
+
+const qp_host_kernels *qp_host_kernels_for(qp_precision precision) {
+#ifdef __x86_64__
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+        return &qp_host_kernels_fma[precision];
+#endif
+    return &qp_host_kernels_any[precision];
+}

@@ -1,0 +1,50 @@
+/* Included by the files that compile the kernels as C, with QP_HOST_TABLE the name of the table to define. */
+#include "host/device/host_kernels.h"
+
+#include "kernels/frame_layout.h"
+#include "kernels/plan_layout.h"
+#include "kernels/portable.h"
+
+#include "kernels/real.h"
+#include "kernels/spline.h"
+
+#include "kernels/domain.cl"
+#include "kernels/hull.cl"
+#include "kernels/regular.cl"
+
+#include "kernels/real_end.h"
+
+#define QP_REAL_DOUBLE
+#include "kernels/real.h"
+#include "kernels/spline.h"
+
+#undef QP_POINT
+#include "kernels/domain.cl"
+#include "kernels/hull.cl"
+#include "kernels/regular.cl"
+
+#include "kernels/real_end.h"
+
+/* Unpacks the arguments. */
+#define QP_HOST_THUNKS(suffix)                                                                               \
+    static void run_hull_##suffix(const qp_host_arg *a, size_t group) {                                      \
+        hull_##suffix(a[0].memory, a[1].memory, a[2].memory, a[3].memory, a[4].memory, a[5].number,          \
+                      a[6].memory, group);                                                                   \
+    }                                                                                                        \
+    static void run_domain_##suffix(const qp_host_arg *a, size_t group) {                                    \
+        domain_##suffix(a[0].memory, a[1].memory, a[2].memory, a[3].memory, a[4].memory, a[5].memory,        \
+                        a[6].number, a[7].memory, a[8].memory, a[9].memory, a[10].memory, a[11].memory,      \
+                        group);                                                                              \
+    }                                                                                                        \
+    static void run_regular_##suffix(const qp_host_arg *a, size_t group) {                                   \
+        regular_##suffix(a[0].memory, a[1].memory, a[2].memory, a[3].number, a[4].memory, a[5].memory,       \
+                         a[6].memory, a[7].memory, group);                                                   \
+    }
+
+QP_HOST_THUNKS(float)
+QP_HOST_THUNKS(double)
+
+const qp_host_kernels QP_HOST_TABLE[2] = {
+    [QP_FLOAT] = {run_hull_float, run_domain_float, run_regular_float},
+    [QP_DOUBLE] = {run_hull_double, run_domain_double, run_regular_double},
+};

@@ -1,0 +1,196 @@
+/* Cuts a layout into batches that fit the device, and hands it over. Within a batch the scratch buffer holds
+ * each patch's rows[level] control points one after the other: the worst case, as nothing is released before
+ * the batch is done. (The paper gives every patch as many points as the deepest one needs; prefix sums cost
+ * nothing here, because the host knows every patch's level.) */
+#include "host/frame/frame.h"
+#include "kernels/frame_layout.h"
+
+#include <stdlib.h>
+
+static void put_wide(uint32_t *word, uint64_t value) {
+    word[0] = (uint32_t)value;
+    word[1] = (uint32_t)(value >> 32);
+}
+
+static uint32_t item_rows(const qp_frame *frame, const qp_frame_item *item) {
+    return frame->surface->plans[frame->surface->patch_plan[item->patch]]->rows[item->level];
+}
+
+static void write_entry(const qp_frame *frame, const qp_frame_item *item, const qp_frame_batch *batch,
+                        uint64_t support, uint32_t *entry) {
+    const qp_surface *surface = frame->surface;
+    for (uint32_t i = 0; i < QP_ENTRY_WORDS; ++i) entry[i] = 0;
+    entry[QP_ENTRY_HEAD] = surface->patch_plan[item->patch] * QP_HEAD_WORDS;
+    entry[QP_ENTRY_ROTATION] = surface->patch_rotation[item->patch];
+    entry[QP_ENTRY_ROWS] = item_rows(frame, item);
+    entry[QP_ENTRY_SAMPLES] = item->samples;
+    put_wide(entry + QP_ENTRY_RING, surface->patch_ring[item->patch]);
+    put_wide(entry + QP_ENTRY_SUPPORT, support);
+    put_wide(entry + QP_ENTRY_GRID, item->grid);
+    put_wide(entry + QP_ENTRY_OUT, item->out - batch->first_sample);
+}
+
+/* Appends the batch that starts at item `begin`; *end is the first item it leaves out. */
+static qp_status cut_batch(qp_frame *frame, size_t begin, size_t *end, uint32_t *next_entry, size_t *capacity,
+                           qp_error *err) {
+    const qp_frame_layout *layout = &frame->layout;
+    const qp_device_info *info = qp_device_get_info(frame->device);
+    const uint64_t most_samples = info->max_buffer_bytes / (6 * frame->real_size);
+    uint64_t scratch = info->memory_bytes / 4;
+    if (scratch == 0 || scratch > info->max_buffer_bytes) scratch = info->max_buffer_bytes;
+    const uint64_t most_points = scratch / (4 * frame->real_size);
+    if (!qp_grow((void **)&frame->batches, capacity, frame->n_batches + 1, sizeof *frame->batches))
+        return qp_fail_memory(err, sizeof *frame->batches, "a frame");
+    qp_frame_batch *batch = &frame->batches[frame->n_batches++];
+    *batch = (qp_frame_batch){.first_sample = layout->items[begin].out};
+    size_t i = begin;
+    for (; i < layout->n_items; ++i) {
+        const qp_frame_item *item = &layout->items[i];
+        const bool fast = qp_frame_is_fast(frame, item->patch);
+        const uint64_t points = fast ? 0 : item_rows(frame, item);
+        if (i > begin &&
+            (batch->n_samples + item->samples > most_samples || batch->points + points > most_points))
+            break;
+        batch->n_samples += item->samples;
+        batch->points += points;
+        if (fast)
+            ++batch->n_regular;
+        else
+            ++batch->n_general;
+    }
+    batch->first_general = *next_entry;
+    batch->first_regular = *next_entry + batch->n_general;
+    *next_entry += batch->n_general + batch->n_regular;
+    if (batch->points > frame->peak_points) frame->peak_points = batch->points;
+    *end = i;
+    return QP_OK;
+}
+
+/* Entries of one batch: those of the general kernels first, in order of their plans, so that patches with the
+ * same weights follow each other. count: scratch, [n_plans + 1]. */
+static void write_batch(const qp_frame *frame, const qp_frame_batch *batch, size_t begin, size_t end,
+                        uint32_t *count, uint32_t *entries) {
+    const qp_surface *surface = frame->surface;
+    const qp_frame_layout *layout = &frame->layout;
+    uint32_t regular = batch->first_regular;
+    for (uint32_t p = 0; p <= surface->n_plans; ++p) count[p] = 0;
+    for (size_t i = begin; i < end; ++i) {
+        uint32_t patch = layout->items[i].patch;
+        if (!qp_frame_is_fast(frame, patch)) ++count[surface->patch_plan[patch] + 1];
+    }
+    for (uint32_t p = 0; p < surface->n_plans; ++p) count[p + 1] += count[p];
+    uint64_t support = 0;
+    for (size_t i = begin; i < end; ++i) {
+        const qp_frame_item *item = &layout->items[i];
+        if (qp_frame_is_fast(frame, item->patch)) {
+            write_entry(frame, item, batch, 0, entries + QP_ENTRY_WORDS * (size_t)regular++);
+        } else {
+            uint32_t at = batch->first_general + count[surface->patch_plan[item->patch]]++;
+            write_entry(frame, item, batch, support, entries + QP_ENTRY_WORDS * (size_t)at);
+            support += item_rows(frame, item);
+        }
+    }
+}
+
+static qp_status write_entries(const qp_frame *frame, uint32_t **entries, const size_t *ends, qp_error *err) {
+    const size_t bytes = frame->layout.n_items * QP_ENTRY_WORDS * sizeof(uint32_t);
+    uint32_t *count = qp_alloc((size_t)frame->surface->n_plans + 1, sizeof *count, false);
+    *entries = qp_alloc(frame->layout.n_items, QP_ENTRY_WORDS * sizeof(uint32_t), false);
+    if (count == NULL || *entries == NULL) {
+        free(count);
+        return qp_fail_memory(err, bytes, "the patches of a frame");
+    }
+    for (size_t b = 0; b < frame->n_batches; ++b)
+        write_batch(frame, &frame->batches[b], b == 0 ? 0 : ends[b - 1], ends[b], count, *entries);
+    free(count);
+    return QP_OK;
+}
+
+/* A page-aligned block of at least `bytes`; contents are not kept. */
+static qp_status reserve_pages(void **block, size_t *have, size_t bytes, const char *what, qp_error *err) {
+    const size_t page = 4096;
+    if (*block != NULL && bytes <= *have) return QP_OK;
+    free(*block);
+    *block = NULL;
+    *have = 0;
+    if (bytes > SIZE_MAX - page) return qp_fail_memory(err, bytes, what);
+    const size_t rounded = (bytes / page + 1) * page;
+    *block = aligned_alloc(page, rounded);
+    if (*block == NULL) return qp_fail_memory(err, bytes, what);
+    *have = rounded;
+    return QP_OK;
+}
+
+/* The stream's memory, and a buffer over each batch's part of it. */
+static qp_status wrap_stream(qp_frame *frame, qp_error *err) {
+    const size_t samples = (size_t)frame->layout.n_samples, sample_bytes = 6 * frame->real_size;
+    qp_status status = reserve_pages(&frame->vertices, &frame->vertex_bytes, samples * sample_bytes,
+                                     "the vertex stream", err);
+    if (status == QP_OK)
+        status = reserve_pages((void **)&frame->flags, &frame->flag_bytes, samples, "the vertex stream", err);
+    if (status == QP_OK && frame->layout.order != NULL)
+        status = reserve_pages(&frame->ordered, &frame->ordered_bytes, samples * (sample_bytes + 1),
+                               "the vertex stream", err);
+    for (size_t b = 0; b < frame->n_batches && status == QP_OK; ++b) {
+        qp_frame_batch *batch = &frame->batches[b];
+        status = qp_buffer_wrap(frame->device, &batch->vertices,
+                                (char *)frame->vertices + (size_t)batch->first_sample * sample_bytes,
+                                (size_t)batch->n_samples * sample_bytes, "the vertex stream", err);
+        if (status == QP_OK)
+            status = qp_buffer_wrap(frame->device, &batch->flags, frame->flags + batch->first_sample,
+                                    (size_t)batch->n_samples, "the vertex stream", err);
+    }
+    return status;
+}
+
+static qp_status upload(qp_frame *frame, qp_buffer *buffer, const void *from, size_t bytes, const char *what,
+                        qp_error *err) {
+    qp_status status = qp_buffer_reserve(frame->device, buffer, bytes, what, err);
+    return status == QP_OK ? qp_buffer_write(frame->device, buffer, from, bytes, err) : status;
+}
+
+qp_status qp_frame_upload_layout(qp_frame *frame, qp_error *err) {
+    const qp_frame_layout *layout = &frame->layout;
+    size_t *ends = NULL, ends_capacity = 0, batch_capacity = 0;
+    uint32_t *entries = NULL, next_entry = 0;
+    qp_status status = QP_OK;
+    if (layout->n_items > UINT32_MAX)
+        return qp_fail(err, QP_BAD_INPUT, "too many patches for one frame (%zu)", layout->n_items);
+    for (size_t begin = 0; begin < layout->n_items && status == QP_OK;) {
+        size_t end = begin;
+        status = cut_batch(frame, begin, &end, &next_entry, &batch_capacity, err);
+        if (status == QP_OK && !qp_grow((void **)&ends, &ends_capacity, frame->n_batches, sizeof *ends))
+            status = qp_fail_memory(err, frame->n_batches * sizeof *ends, "a frame");
+        if (status == QP_OK) ends[frame->n_batches - 1] = end;
+        begin = end;
+    }
+    if (status == QP_OK) status = write_entries(frame, &entries, ends, err);
+    const size_t grid_bytes = (layout->grid_points + QP_PADDING) * sizeof(float);
+    if (status == QP_OK)
+        status = upload(frame, &frame->entries, entries, layout->n_items * QP_ENTRY_WORDS * sizeof(uint32_t),
+                        "the patches of a frame", err);
+    if (status == QP_OK)
+        status = upload(frame, &frame->grid_u, layout->grid_u, grid_bytes, "tessellation grids", err);
+    if (status == QP_OK)
+        status = upload(frame, &frame->grid_v, layout->grid_v, grid_bytes, "tessellation grids", err);
+    if (status == QP_OK)
+        status = qp_buffer_reserve(frame->device, &frame->support,
+                                   (size_t)frame->peak_points * 4 * frame->real_size, "control points", err);
+    if (status == QP_OK) status = wrap_stream(frame, err);
+    free(entries);
+    free(ends);
+    return status;
+}
+
+void qp_frame_drop_layout(qp_frame *frame) {
+    for (size_t b = 0; b < frame->n_batches; ++b) {
+        qp_buffer_free(frame->device, &frame->batches[b].vertices);
+        qp_buffer_free(frame->device, &frame->batches[b].flags);
+    }
+    free(frame->batches);
+    frame->batches = NULL;
+    frame->n_batches = 0;
+    frame->peak_points = 0;
+    frame->tessellated = false;
+    qp_layout_free(&frame->layout);
+}

@@ -1,0 +1,287 @@
+/* One frame: hull, then domain, for every patch of a surface (sections 5 to 7 of the paper). */
+#include "host/frame/frame.h"
+#include "kernels/frame_layout.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static qp_status upload(qp_frame *frame, qp_buffer *buffer, const void *from, size_t bytes, const char *what,
+                        qp_error *err) {
+    qp_status status = qp_buffer_reserve(frame->device, buffer, bytes, what, err);
+    return status == QP_OK ? qp_buffer_write(frame->device, buffer, from, bytes, err) : status;
+}
+
+/* Which kernels, and which code in them, the patches need. */
+static void collect_needs(const qp_frame *frame, unsigned *kernels, uint32_t *plan_flags) {
+    const qp_surface *surface = frame->surface;
+    *kernels = 0;
+    *plan_flags = 0;
+    for (uint32_t p = 0; p < surface->mesh->n_patches; ++p) {
+        if (surface->patch_plan[p] == QP_NONE) continue;
+        if (qp_frame_is_fast(frame, p)) {
+            *kernels |= 1u << QP_KERNEL_REGULAR;
+        } else {
+            *kernels |= 1u << QP_KERNEL_HULL | 1u << QP_KERNEL_DOMAIN;
+            *plan_flags |= surface->plans[surface->patch_plan[p]]->flags;
+        }
+    }
+}
+
+static qp_status upload_plans(qp_frame *frame, qp_error *err) {
+    const qp_surface *surface = frame->surface;
+    qp_plan_pack pack = {0};
+    qp_status status = qp_surface_pack(surface, frame->options.precision, &pack, err);
+    if (status != QP_OK) return status;
+    status = upload(frame, &frame->heads, pack.heads, pack.head_words * sizeof *pack.heads, "plans", err);
+    if (status == QP_OK)
+        status =
+            upload(frame, &frame->trees, pack.tree, pack.tree_words * sizeof *pack.tree, "quadtrees", err);
+    if (status == QP_OK) {
+        /* The hull reads whole blocks of lanes: pad. */
+        const size_t bytes = pack.real_count * frame->real_size, padding = QP_PADDING * frame->real_size;
+        char *padded = qp_alloc(bytes + padding, 1, true);
+        if (padded == NULL) {
+            status = qp_fail_memory(err, bytes + padding, "stencils");
+        } else {
+            if (bytes != 0) memcpy(padded, pack.reals, bytes);
+            status = upload(frame, &frame->reals, padded, bytes + padding, "stencils", err);
+            free(padded);
+        }
+    }
+    if (status == QP_OK)
+        status = upload(frame, &frame->rings, surface->rings,
+                        (size_t)surface->ring_entries * sizeof(uint32_t), "1-rings", err);
+    free(pack.heads);
+    free(pack.tree);
+    free(pack.reals);
+    return status;
+}
+
+qp_status qp_frame_update_positions(qp_frame *frame, qp_error *err) {
+    const qp_mesh *mesh = frame->surface->mesh;
+    const size_t count = 3 * (size_t)mesh->n_vertices;
+    void *rounded = qp_alloc(count, frame->real_size, false);
+    if (rounded == NULL) return qp_fail_memory(err, count * frame->real_size, "positions");
+    qp_status status = QP_OK;
+    for (size_t i = 0; i < count; ++i) {
+        const double x = mesh->positions[i];
+        const bool is_float = frame->options.precision == QP_FLOAT;
+        if (!isfinite(is_float ? (double)(float)x : x)) {
+            status = qp_fail(err, QP_BAD_INPUT, "position %g of vertex %zu is out of the range of %s", x,
+                             i / 3, is_float ? "float" : "double");
+            break;
+        }
+        if (is_float)
+            ((float *)rounded)[i] = (float)x;
+        else
+            ((double *)rounded)[i] = x;
+    }
+    if (status == QP_OK)
+        status = upload(frame, &frame->positions, rounded, count * frame->real_size, "positions", err);
+    free(rounded);
+    return status;
+}
+
+qp_status qp_frame_create(qp_device *device, const qp_surface *surface, const qp_frame_options *options,
+                          qp_frame **frame, qp_error *err) {
+    *frame = NULL;
+    qp_frame *f = qp_alloc(1, sizeof *f, true);
+    if (f == NULL) return qp_fail_memory(err, sizeof *f, "a frame");
+    f->device = device;
+    f->surface = surface;
+    if (options != NULL) f->options = *options;
+    f->real_size = f->options.precision == QP_DOUBLE ? sizeof(double) : sizeof(float);
+    unsigned kernels;
+    uint32_t plan_flags;
+    collect_needs(f, &kernels, &plan_flags);
+    qp_status status = qp_program_build(device, f->options.precision, kernels, plan_flags, &f->program, err);
+    if (status == QP_OK) status = upload_plans(f, err);
+    if (status == QP_OK) status = qp_frame_update_positions(f, err);
+    if (status != QP_OK) {
+        qp_frame_free(f);
+        return status;
+    }
+    *frame = f;
+    return QP_OK;
+}
+
+void qp_frame_free(qp_frame *frame) {
+    if (frame == NULL) return;
+    qp_frame_drop_layout(frame);
+    qp_buffer *const buffers[] = {&frame->heads,  &frame->trees,     &frame->reals,
+                                  &frame->rings,  &frame->positions, &frame->entries,
+                                  &frame->grid_u, &frame->grid_v,    &frame->support};
+    for (size_t i = 0; i < sizeof buffers / sizeof buffers[0]; ++i) qp_buffer_free(frame->device, buffers[i]);
+    qp_program_free(&frame->program);
+    free(frame->patch_factors);
+    free(frame->vertices);
+    free(frame->flags);
+    free(frame->ordered);
+    free(frame);
+}
+
+/* Starts the kernels of every batch. */
+static qp_status launch_batches(qp_frame *frame, double *hull_ms, double *domain_ms, qp_error *err) {
+    qp_status status = QP_OK;
+    for (size_t b = 0; b < frame->n_batches && status == QP_OK; ++b) {
+        qp_frame_batch *batch = &frame->batches[b];
+        status = qp_buffer_unmap(frame->device, &batch->vertices, err);
+        if (status == QP_OK) status = qp_buffer_unmap(frame->device, &batch->flags, err);
+        const qp_arg hull[] = {{&frame->heads, 0},     {&frame->reals, 0},   {&frame->rings, 0},
+                               {&frame->positions, 0}, {&frame->entries, 0}, {NULL, batch->first_general},
+                               {&frame->support, 0}};
+        const qp_arg domain[] = {{&frame->heads, 0},           {&frame->trees, 0},     {&frame->reals, 0},
+                                 {&frame->rings, 0},           {&frame->positions, 0}, {&frame->entries, 0},
+                                 {NULL, batch->first_general}, {&frame->support, 0},   {&frame->grid_u, 0},
+                                 {&frame->grid_v, 0},          {&batch->vertices, 0},  {&batch->flags, 0}};
+        const qp_arg regular[] = {{&frame->rings, 0},           {&frame->positions, 0}, {&frame->entries, 0},
+                                  {NULL, batch->first_regular}, {&frame->grid_u, 0},    {&frame->grid_v, 0},
+                                  {&batch->vertices, 0},        {&batch->flags, 0}};
+        if (status == QP_OK)
+            status = qp_launch(frame->device, &frame->program, QP_KERNEL_HULL, hull,
+                               sizeof hull / sizeof hull[0], batch->n_general, hull_ms, err);
+        if (status == QP_OK)
+            status = qp_launch(frame->device, &frame->program, QP_KERNEL_DOMAIN, domain,
+                               sizeof domain / sizeof domain[0], batch->n_general, domain_ms, err);
+        if (status == QP_OK)
+            status = qp_launch(frame->device, &frame->program, QP_KERNEL_REGULAR, regular,
+                               sizeof regular / sizeof regular[0], batch->n_regular, domain_ms, err);
+    }
+    return status;
+}
+
+typedef struct order_job {
+    const qp_frame *frame;
+    size_t sample_bytes;
+} order_job;
+
+static void order_samples(void *context, size_t begin, size_t end, unsigned worker) {
+    const order_job *job = context;
+    const qp_frame *frame = job->frame;
+    char *vertices = frame->ordered, *flags = vertices + frame->layout.n_samples * job->sample_bytes;
+    (void)worker;
+    for (size_t i = begin; i < end; ++i) {
+        const size_t at = (size_t)frame->layout.order[i];
+        memcpy(vertices + i * job->sample_bytes, (const char *)frame->vertices + at * job->sample_bytes,
+               job->sample_bytes);
+        flags[i] = (char)frame->flags[at];
+    }
+}
+
+enum { HASH_BLOCK = 1 << 20 };
+
+typedef struct hash_job {
+    const char *bytes;
+    size_t length;
+    uint64_t *hashes;
+} hash_job;
+
+static void hash_blocks(void *context, size_t begin, size_t end, unsigned worker) {
+    const hash_job *job = context;
+    (void)worker;
+    for (size_t b = begin; b < end; ++b) {
+        size_t at = b * (size_t)HASH_BLOCK, left = job->length - at;
+        job->hashes[b] = qp_hash(job->bytes + at, left < HASH_BLOCK ? left : HASH_BLOCK, b);
+    }
+}
+
+/* Hash of the hashes of blocks of a megabyte, so that threads can share the work. */
+static qp_status hash_stream(const void *bytes, size_t length, uint64_t *hash, qp_error *err) {
+    const size_t blocks = length / HASH_BLOCK + (length % HASH_BLOCK != 0);
+    hash_job job = {bytes, length, qp_alloc(blocks, sizeof(uint64_t), false)};
+    if (job.hashes == NULL) return qp_fail_memory(err, blocks * sizeof(uint64_t), "hashes");
+    qp_parallel(blocks, 1, hash_blocks, &job);
+    *hash = qp_hash(job.hashes, blocks * sizeof(uint64_t), length);
+    free(job.hashes);
+    return QP_OK;
+}
+
+/* Evaluates the layout that is uploaded. */
+static qp_status evaluate(qp_frame *frame, qp_stream *stream, qp_error *err) {
+    const qp_frame_layout *layout = &frame->layout;
+    const size_t sample_bytes = 6 * frame->real_size;
+    *stream = (qp_stream){.precision = frame->options.precision,
+                          .n_samples = layout->n_samples,
+                          .vertices = frame->vertices,
+                          .flags = frame->flags,
+                          .uv = layout->uv,
+                          .sample_patch = layout->sample_patch,
+                          .n_triangles = layout->n_triangles,
+                          .triangles = layout->triangles,
+                          .support_bytes = frame->peak_points * 4 * frame->real_size};
+    const double start = qp_now_ms();
+    qp_status status = launch_batches(frame, &stream->hull_ms, &stream->domain_ms, err);
+    /* Also after a failure: what was started writes its times into *stream. */
+    qp_error finish_error;
+    qp_status finished = qp_device_finish(frame->device, &finish_error);
+    if (status == QP_OK && finished != QP_OK) status = qp_fail(err, finished, "%s", finish_error.message);
+    for (size_t b = 0; b < frame->n_batches && status == QP_OK; ++b) {
+        status = qp_buffer_map(frame->device, &frame->batches[b].vertices, err);
+        if (status == QP_OK) status = qp_buffer_map(frame->device, &frame->batches[b].flags, err);
+    }
+    if (status == QP_OK && layout->order != NULL) {
+        order_job job = {frame, sample_bytes};
+        qp_parallel((size_t)layout->n_samples, 4096, order_samples, &job);
+        stream->vertices = frame->ordered;
+        stream->flags = (const uint8_t *)frame->ordered + layout->n_samples * sample_bytes;
+    }
+    stream->frame_ms = qp_now_ms() - start;
+    if (status == QP_OK && frame->options.want_hash)
+        status = hash_stream(stream->vertices, (size_t)layout->n_samples * sample_bytes, &stream->hash, err);
+    if (status != QP_OK) *stream = (qp_stream){0};
+    return status;
+}
+
+/* Is this the tessellation that the frame is set up for? */
+static bool same_tessellation(const qp_frame *frame, const qp_tessellation *t) {
+    if (!frame->tessellated || t->spacing != frame->tessellation.spacing) return false;
+    if ((t->patch_factors == NULL) != (frame->patch_factors == NULL)) return false;
+    if (t->patch_factors == NULL) return t->factor == frame->tessellation.factor;
+    return memcmp(t->patch_factors, frame->patch_factors,
+                  6 * sizeof(float) * frame->surface->mesh->n_patches) == 0;
+}
+
+static qp_status set_up(qp_frame *frame, const qp_tessellation *tessellation, qp_error *err) {
+    const size_t n_factors = 6 * (size_t)frame->surface->mesh->n_patches;
+    qp_frame_drop_layout(frame);
+    free(frame->patch_factors);
+    frame->patch_factors = NULL;
+    if (tessellation->patch_factors != NULL) {
+        frame->patch_factors = qp_alloc(n_factors, sizeof(float), false);
+        if (frame->patch_factors == NULL)
+            return qp_fail_memory(err, n_factors * sizeof(float), "tessellation factors");
+        memcpy(frame->patch_factors, tessellation->patch_factors, n_factors * sizeof(float));
+    }
+    frame->tessellation = *tessellation;
+    frame->tessellation.patch_factors = frame->patch_factors;
+    qp_status status = qp_layout_tessellate(frame->surface, tessellation, frame->options.want_triangles,
+                                            &frame->layout, err);
+    if (status == QP_OK) status = qp_frame_upload_layout(frame, err);
+    if (status == QP_OK)
+        frame->tessellated = true;
+    else
+        qp_frame_drop_layout(frame);
+    return status;
+}
+
+qp_status qp_frame_eval(qp_frame *frame, const qp_tessellation *tessellation, qp_stream *stream,
+                        qp_error *err) {
+    *stream = (qp_stream){0};
+    if (!same_tessellation(frame, tessellation)) {
+        qp_status status = set_up(frame, tessellation, err);
+        if (status != QP_OK) return status;
+    }
+    return evaluate(frame, stream, err);
+}
+
+qp_status qp_frame_eval_points(qp_frame *frame, uint64_t count, const uint32_t *patch, const float *uv,
+                               qp_stream *stream, qp_error *err) {
+    *stream = (qp_stream){0};
+    qp_frame_drop_layout(frame);
+    qp_status status = qp_layout_points(frame->surface, count, patch, uv, &frame->layout, err);
+    if (status == QP_OK) status = qp_frame_upload_layout(frame, err);
+    if (status == QP_OK) return evaluate(frame, stream, err);
+    qp_frame_drop_layout(frame);
+    return status;
+}

@@ -1,0 +1,85 @@
+/* One frame, inside: what is to be evaluated (layout), and how it is cut up for the device (batches). */
+#ifndef QP_FRAME_FRAME_H
+#define QP_FRAME_FRAME_H
+
+#include "host/device/device.h"
+#include "host/plan/plan.h"
+
+/* Samples of one patch, evaluated by one work-group. */
+typedef struct qp_frame_item {
+    uint32_t patch, samples;
+    uint32_t level; /* rows[level] of the patch's plan are needed */
+    uint64_t grid;  /* first (u,v) in grid_u, grid_v */
+    uint64_t out;   /* first sample in the stream */
+} qp_frame_item;
+
+/* What to evaluate. Items are in order of .out and cover the stream without gaps; several may share a grid.
+ */
+typedef struct qp_frame_layout {
+    size_t n_items;
+    qp_frame_item *items;
+    size_t grid_points;
+    float *grid_u, *grid_v; /* [grid_points + QP_PADDING] */
+    uint64_t n_samples, n_triangles;
+    float *uv;              /* [2 * n_samples] */
+    uint32_t *sample_patch; /* [n_samples] */
+    uint32_t *triangles;    /* [3 * n_triangles], NULL unless asked for */
+    uint64_t *order;        /* sample i of the caller is sample order[i] of the items; NULL: the same */
+} qp_frame_layout;
+
+/* The tessellator's points of every patch that has a surface. With a uniform factor f and n-gons in the mesh:
+ * see layout.c. Errors: QP_BAD_INPUT for a factor that is not in [1, 64], QP_SYSTEM for memory. */
+qp_status qp_layout_tessellate(const qp_surface *surface, const qp_tessellation *tessellation,
+                               bool want_triangles, qp_frame_layout *layout, qp_error *err);
+/* Any points, grouped by patch. Errors: QP_BAD_INPUT names the first point that is none of a patch with a
+ * surface. */
+qp_status qp_layout_points(const qp_surface *surface, uint64_t count, const uint32_t *patch, const float *uv,
+                           qp_frame_layout *layout, qp_error *err);
+void qp_layout_free(qp_frame_layout *layout);
+
+/* A run of items whose samples fit a buffer of the device, and whose control points fit the scratch buffer.
+ */
+typedef struct qp_frame_batch {
+    uint64_t first_sample, n_samples;
+    uint32_t first_general, n_general, first_regular, n_regular; /* entries */
+    uint64_t points;                                             /* control points, all held at once */
+    qp_buffer vertices, flags;
+} qp_frame_batch;
+
+struct qp_frame {
+    qp_device *device;
+    const qp_surface *surface;
+    qp_frame_options options;
+    size_t real_size;
+    qp_program program;
+    qp_buffer heads, trees, reals, rings, positions; /* of the surface */
+    qp_buffer entries, grid_u, grid_v, support;      /* of the layout */
+
+    qp_frame_layout layout;
+    bool tessellated; /* layout is of the tessellation below, and everything is uploaded */
+    qp_tessellation tessellation;
+    float *patch_factors; /* copy, or NULL */
+    size_t n_batches;
+    qp_frame_batch *batches;
+    uint64_t peak_points;
+
+    void *vertices; /* the stream's, page-aligned; grows only */
+    size_t vertex_bytes;
+    uint8_t *flags;
+    size_t flag_bytes;
+    void *ordered; /* vertices and flags in the caller's order, where that differs */
+    size_t ordered_bytes;
+};
+
+/* Cuts the layout into batches and uploads it. */
+qp_status qp_frame_upload_layout(qp_frame *frame, qp_error *err);
+/* Frees what qp_frame_upload_layout made, buffers that can be used again apart. */
+void qp_frame_drop_layout(qp_frame *frame);
+
+/* Is this patch evaluated by the fast pass? */
+static inline bool qp_frame_is_fast(const qp_frame *frame, uint32_t patch) {
+    return !frame->options.no_regular_pass &&
+           frame->surface->patch_plan[patch] == frame->surface->regular_plan;
+}
+
+#endif

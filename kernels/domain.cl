@@ -1,0 +1,230 @@
+/* Domain stage: position and normal at every sample of one patch a work-group (section 6 of the paper).
+ *
+ * Each work-item strides over the samples; for each it walks the plan's quadtree from the root to the leaf
+ * that holds (u,v), which doubles exactly on the way, and evaluates the leaf from the control points that the
+ * hull stage has made. */
+
+/* One of the points of a node: 16-bit index number k of the words at `words`. */
+#define QP_POINT(words, k) support[((words)[(k) >> 1] >> (((k)&1u) << 4)) & 0xffffu]
+
+/* 16 points, row-major, with the row weights given. */
+QP_FUNCTION void QP_NAME(spline_grid)(__global const real4 *support, __global const uint *words,
+                                      const real bu[4], const real du[4], const real bv[4], const real dv[4],
+                                      QP_NAME(surface_point) * s) {
+    for (uint j = 0; j < 4u; ++j) {
+        const uint left = words[2u * j], right = words[2u * j + 1u];
+        QP_NAME(add_row)
+        (s, j == 0, support[left & 0xffffu], support[left >> 16], support[right & 0xffffu],
+         support[right >> 16], bu, du, bv[j], dv[j]);
+    }
+}
+
+QP_FUNCTION void QP_NAME(add_origin)(__global const real4 *support, uint origin, QP_NAME(surface_point) * s) {
+    if (origin != QP_NO_POINT) s->p = add4(support[origin], s->p);
+}
+
+QP_FUNCTION void QP_NAME(eval_regular)(__global const real4 *support, __global const uint *node, real u,
+                                       real v, QP_NAME(surface_point) * s) {
+    real bu[4], du[4], bv[4], dv[4];
+    QP_NAME(basis)(u, bu, du);
+    QP_NAME(basis)(v, bv, dv);
+    QP_NAME(spline_grid)(support, node + 2, bu, du, bv, dv, s);
+    QP_NAME(add_origin)(support, node[1], s);
+}
+
+#if QP_WITH_CREASE
+/* A single semi-sharp crease along v=0: across it the basis is that of the zone v lies in, times its matrix
+ * (section 4.3; plan_layout.h). */
+QP_FUNCTION void QP_NAME(eval_crease)(__global const real4 *support, __global const uint *node,
+                                      __global const real *constants, real u, real v,
+                                      QP_NAME(surface_point) * s) {
+    real bu[4], du[4], b[4], d[4], bv[4], dv[4];
+    const uint zone = v >= constants[0] ? 0u : v >= constants[1] ? 1u : 2u;
+    const real scale = constants[2u + zone];
+    __global const real *m = constants + 5u + 16u * zone;
+    QP_NAME(basis)(u, bu, du);
+    QP_NAME(basis)(v * scale, b, d);
+    for (uint j = 0; j < 4u; ++j) {
+        bv[j] = fma(b[3], m[12u + j], fma(b[2], m[8u + j], fma(b[1], m[4u + j], b[0] * m[j])));
+        dv[j] = scale * fma(d[3], m[12u + j], fma(d[2], m[8u + j], fma(d[1], m[4u + j], d[0] * m[j])));
+    }
+    QP_NAME(spline_grid)(support, node + 2, bu, du, bv, dv, s);
+    QP_NAME(add_origin)(support, node[1], s);
+}
+#endif
+
+#if QP_WITH_TERMINAL
+/* One of the three regular sub-domains of a terminal node's ring level: (u,v) with u >= 1/2 or v >= 1/2. */
+QP_FUNCTION void QP_NAME(eval_ring)(__global const real4 *support, __global const uint *ring, uint origin,
+                                    real u, real v, QP_NAME(surface_point) * s) {
+    real bu[4], du[4], bv[4], dv[4];
+    const uint cx = u >= QP_R(0.5), cy = v >= QP_R(0.5);
+    uint slot = 5u * cy + cx - 1u;
+    QP_NAME(basis)(QP_R(2.0) * u - (real)cx, bu, du);
+    QP_NAME(basis)(QP_R(2.0) * v - (real)cy, bv, dv);
+    for (uint j = 0; j < 4u; ++j, slot += 5u)
+        QP_NAME(add_row)
+        (s, j == 0, QP_POINT(ring, slot), QP_POINT(ring, slot + 1u), QP_POINT(ring, slot + 2u),
+         QP_POINT(ring, slot + 3u), bu, du, bv[j], dv[j]);
+    QP_NAME(add_origin)(support, origin, s);
+}
+#endif
+
+#if QP_WITH_CORNERS
+/* Limit position and tangents, three points from number k on. */
+QP_FUNCTION void QP_NAME(eval_limit)(__global const real4 *support, __global const uint *words, uint k,
+                                     QP_NAME(surface_point) * s) {
+    s->p = QP_POINT(words, k);
+    const uint t1 = (words[(k + 1u) >> 1] >> (((k + 1u) & 1u) << 4)) & 0xffffu;
+    const uint t2 = (words[(k + 2u) >> 1] >> (((k + 2u) & 1u) << 4)) & 0xffffu;
+    if (t1 == QP_NO_POINT || t2 == QP_NO_POINT) {
+        s->du = s->dv = make4(QP_R(0.0), QP_R(0.0), QP_R(0.0));
+    } else {
+        s->du = support[t1];
+        s->dv = support[t2];
+    }
+}
+
+/* A leaf with four corners known: exact there, and a bilinear blend, flagged, elsewhere. */
+QP_FUNCTION void QP_NAME(eval_irregular)(__global const real4 *support, __global const uint *node, real u,
+                                         real v, QP_NAME(surface_point) * s) {
+    const int at_u = u == QP_R(0.0) || u == QP_R(1.0), at_v = v == QP_R(0.0) || v == QP_R(1.0);
+    __global const uint *words = node + 1;
+    if (at_u && at_v) {
+        const uint corner = v == QP_R(0.0) ? (u == QP_R(0.0) ? 0u : 1u) : (u == QP_R(0.0) ? 3u : 2u);
+        QP_NAME(eval_limit)(support, words, 3u * corner, s);
+        return;
+    }
+    const real4 p00 = QP_POINT(words, 0u), p10 = QP_POINT(words, 3u);
+    const real4 p11 = QP_POINT(words, 6u), p01 = QP_POINT(words, 9u);
+    const real4 low = sub4(p10, p00), high = sub4(p11, p01);
+    const real4 low_p = fma4(low, u, p00), high_p = fma4(high, u, p01);
+    s->dv = sub4(high_p, low_p);
+    s->du = fma4(sub4(high, low), v, low);
+    s->p = fma4(s->dv, v, low_p);
+    s->flags |= QP_FLAG_PAST_DEPTH;
+}
+#endif
+
+#if QP_WITH_CORNERS && QP_WITH_TERMINAL
+/* What remains at an extraordinary corner (0,0): exact there; elsewhere, flagged, on the ray from the limit
+ * point to where it leaves the corner cell, which the terminal's last ring covers. */
+QP_FUNCTION void QP_NAME(eval_extraordinary)(__global const real4 *support, __global const uint *node,
+                                             __global const uint *ring, uint origin, real u, real v,
+                                             QP_NAME(surface_point) * s) {
+    const real t = u > v ? u : v;
+    /* Points 0..2 are 16-bit values in a word each. */
+    if (t == QP_R(0.0) || ring == 0) {
+        s->p = support[node[1]];
+        if (node[2] == QP_NO_POINT || node[3] == QP_NO_POINT) {
+            s->du = s->dv = make4(QP_R(0.0), QP_R(0.0), QP_R(0.0));
+        } else {
+            s->du = support[node[2]];
+            s->dv = support[node[3]];
+        }
+        if (t != QP_R(0.0)) s->flags |= QP_FLAG_PAST_DEPTH;
+        return;
+    }
+    /* The larger of the two is exactly 1/2. */
+    QP_NAME(eval_ring)(support, ring, origin, QP_R(0.5) * qp_div(u, t), QP_R(0.5) * qp_div(v, t), s);
+    const real4 limit = support[node[1]];
+    s->p = fma4(sub4(s->p, limit), t, limit);
+    s->flags |= QP_FLAG_PAST_DEPTH;
+}
+#endif
+
+/* The leaf of (u,v), evaluated. */
+QP_FUNCTION void QP_NAME(eval_tree)(__global const uint *tree, __global const real *constants,
+                                    __global const real4 *support, real u, real v,
+                                    QP_NAME(surface_point) * s) {
+    __global const uint *node = tree;
+#if QP_WITH_TERMINAL && QP_WITH_CORNERS
+    __global const uint *last_ring = 0;
+    uint last_origin = QP_NO_POINT;
+#endif
+    s->flags = 0;
+    for (;;) {
+        const uint word = node[0], kind = QP_NODE_KIND(word);
+#if QP_WITH_INTERNAL
+        if (kind == QP_NODE_INTERNAL) {
+            const uint cu = u > QP_R(0.5) || (u == QP_R(0.5) && QP_NODE_TIE_U(word) == 0);
+            const uint cv = v > QP_R(0.5) || (v == QP_R(0.5) && QP_NODE_TIE_V(word) == 0);
+            u = QP_R(2.0) * u - (real)cu;
+            v = QP_R(2.0) * v - (real)cv;
+            node = tree + node[1u + cu + 2u * cv];
+            continue;
+        }
+#endif
+#if QP_WITH_TERMINAL
+        if (kind == QP_NODE_TERMINAL) {
+            const uint rings = QP_NODE_RINGS(word), origin = node[1];
+            __global const uint *ring = node + 3;
+            QP_NAME(rotate_uv)(QP_NODE_ROTATION(word), &u, &v);
+            for (uint k = 0; k < rings; ++k, ring += 12) {
+                if (u >= QP_R(0.5) || v >= QP_R(0.5)) {
+                    QP_NAME(eval_ring)(support, ring, origin, u, v, s);
+                    return;
+                }
+                u = QP_R(2.0) * u;
+                v = QP_R(2.0) * v;
+            }
+#if QP_WITH_CORNERS
+            last_ring = rings == 0 ? 0 : ring - 12;
+            last_origin = origin;
+#endif
+            node = tree + node[2];
+            continue;
+        }
+#endif
+#if QP_WITH_CREASE
+        if (kind == QP_NODE_CREASE) {
+            QP_NAME(rotate_uv)(QP_NODE_ROTATION(word), &u, &v);
+            QP_NAME(eval_crease)(support, node, constants + node[10], u, v, s);
+            return;
+        }
+#endif
+#if QP_WITH_CORNERS
+#if QP_WITH_TERMINAL
+        if (kind == QP_NODE_EXTRAORDINARY) {
+            QP_NAME(eval_extraordinary)(support, node, last_ring, last_origin, u, v, s);
+            return;
+        }
+#endif
+        if (kind == QP_NODE_IRREGULAR) {
+            QP_NAME(eval_irregular)(support, node, u, v, s);
+            return;
+        }
+#endif
+        QP_NAME(eval_regular)(support, node, u, v, s);
+        return;
+    }
+}
+
+__kernel void QP_NAME(domain)(__global const uint *heads, __global const uint *trees,
+                              __global const real *reals, __global const uint *rings,
+                              __global const real *positions, __global const uint *entries, uint first_entry,
+                              __global const real *support, __global const float *grid_u,
+                              __global const float *grid_v, __global real *vertices,
+                              __global uchar *flags QP_GROUP) {
+    __global const uint *entry = entries + ((ulong)first_entry + get_group_id(0)) * QP_ENTRY_WORDS;
+    __global const uint *head = heads + entry[QP_ENTRY_HEAD];
+    __global const uint *tree = trees + head[QP_HEAD_TREE];
+    __global const real *constants = reals + head[QP_HEAD_REALS];
+    __global const real4 *points = (__global const real4 *)support + QP_ENTRY_WIDE(entry, QP_ENTRY_SUPPORT);
+    __global const float *us = grid_u + QP_ENTRY_WIDE(entry, QP_ENTRY_GRID);
+    __global const float *vs = grid_v + QP_ENTRY_WIDE(entry, QP_ENTRY_GRID);
+    __global const real *base = positions + 3u * (ulong)rings[QP_ENTRY_WIDE(entry, QP_ENTRY_RING)];
+    const real4 origin = make4(base[0], base[1], base[2]);
+    const ulong out = QP_ENTRY_WIDE(entry, QP_ENTRY_OUT);
+    const uint rotation = entry[QP_ENTRY_ROTATION];
+    const uint samples = entry[QP_ENTRY_SAMPLES];
+
+    for (uint i = (uint)get_local_id(0); i < samples; i += (uint)get_local_size(0)) {
+        QP_NAME(surface_point) s;
+        real u = us[i], v = vs[i];
+        QP_NAME(rotate_uv)(rotation, &u, &v);
+        QP_NAME(eval_tree)(tree, constants, points, u, v, &s);
+        const real4 n = QP_NAME(unit_normal)(s.du, s.dv, &s.flags);
+        QP_NAME(write_sample)(vertices, flags, out + i, add4(origin, s.p), n, s.flags);
+    }
+}

@@ -1,0 +1,77 @@
+/* Hull stage: the control points of one patch a work-group (section 5 of the paper).
+ *
+ *   support[i] = sum over ring vertices j of weight[j][i] * (position[ring[j]] - position[ring[0]])
+ *
+ * for the entry's first `rows` points i, 4 reals a point (x, y, z, 0). Each work-item takes blocks of
+ * QP_LANES neighbouring points, whose weights lie side by side. The ring goes through local memory in chunks,
+ * for it may be of any size; sums run in ring order whatever the chunk or block, so that neither changes a
+ * bit. */
+#ifndef QP_HULL_CHUNK
+#define QP_HULL_CHUNK 128u
+#endif
+
+__kernel void QP_NAME(hull)(__global const uint *heads, __global const real *reals,
+                            __global const uint *rings, __global const real *positions,
+                            __global const uint *entries, uint first_entry, __global real *support QP_GROUP) {
+    __local real ring_x[QP_HULL_CHUNK];
+    __local real ring_y[QP_HULL_CHUNK];
+    __local real ring_z[QP_HULL_CHUNK];
+    __global const uint *entry = entries + ((ulong)first_entry + get_group_id(0)) * QP_ENTRY_WORDS;
+    __global const uint *head = heads + entry[QP_ENTRY_HEAD];
+    __global const uint *ring = rings + QP_ENTRY_WIDE(entry, QP_ENTRY_RING);
+    __global real *out = support + 4u * QP_ENTRY_WIDE(entry, QP_ENTRY_SUPPORT);
+    const uint rows = entry[QP_ENTRY_ROWS];
+    const uint ring_size = head[QP_HEAD_RING];
+    const ulong points = head[QP_HEAD_POINTS];
+    __global const real *weights = reals + head[QP_HEAD_REALS];
+    __global const real *origin = positions + 3u * (ulong)ring[0];
+    const real ox = origin[0], oy = origin[1], oz = origin[2];
+    const uint item = (uint)get_local_id(0), items = (uint)get_local_size(0);
+
+    for (uint begin = 0; begin < ring_size; begin += QP_HULL_CHUNK) {
+        const uint count = ring_size - begin < QP_HULL_CHUNK ? ring_size - begin : QP_HULL_CHUNK;
+        barrier(CLK_LOCAL_MEM_FENCE); /* nobody still reads the chunk before */
+        for (uint j = item; j < count; j += items) {
+            __global const real *p = positions + 3u * (ulong)ring[begin + j];
+            ring_x[j] = p[0] - ox;
+            ring_y[j] = p[1] - oy;
+            ring_z[j] = p[2] - oz;
+        }
+        barrier(CLK_LOCAL_MEM_FENCE);
+        for (uint i = item * QP_LANES; i < rows; i += items * QP_LANES) {
+            const uint block = rows - i < QP_LANES ? rows - i : QP_LANES;
+            lanes x = splat(QP_R(0.0)), y = x, z = x;
+            real spill[3][QP_LANES];
+            if (begin != 0) {
+                for (uint l = 0; l < QP_LANES; ++l) {
+                    /* Lanes past the end repeat the last point and are not written. */
+                    __global const real *p = out + 4u * (ulong)(i + (l < block ? l : block - 1u));
+                    spill[0][l] = p[0];
+                    spill[1][l] = p[1];
+                    spill[2][l] = p[2];
+                }
+                x = load_lanes(spill[0]);
+                y = load_lanes(spill[1]);
+                z = load_lanes(spill[2]);
+            }
+            /* Reads up to QP_LANES - 1 weights past the row: the next row's, or the padding of the buffer. */
+            __global const real *weight = weights + begin * points + i;
+            for (uint j = 0; j < count; ++j, weight += points) {
+                const lanes w = load_lanes(weight);
+                x = fma_lanes(w, splat(ring_x[j]), x);
+                y = fma_lanes(w, splat(ring_y[j]), y);
+                z = fma_lanes(w, splat(ring_z[j]), z);
+            }
+            store_lanes(x, spill[0]);
+            store_lanes(y, spill[1]);
+            store_lanes(z, spill[2]);
+            for (uint l = 0; l < block; ++l) {
+                __global real *p = out + 4u * (ulong)(i + l);
+                p[0] = spill[0][l];
+                p[1] = spill[1][l];
+                p[2] = spill[2][l];
+                p[3] = QP_R(0.0);
+            }
+        }
+    }
+}

@@ -1,0 +1,62 @@
+/* One source, two compilers: the kernels are OpenCL C 1.2, and through this header C11, so that the host can
+ * run the very same lines (under sanitizers, in a debugger, or where there is no device) and make the same
+ * bits.
+ *
+ * The host runs a work-group as one work-item: kernels stride over their work by get_local_size and so do all
+ * of it. Nothing but correctly rounded operations is used: + - * fma, and / sqrt by way of qp_div and qp_sqrt
+ * (real.h). Contraction is off in both languages.
+ *
+ * A program is the concatenation portable.h plan_layout.h frame_layout.h real.h spline.h and the stages'
+ * files. */
+#ifndef QP_KERNELS_PORTABLE_H
+#define QP_KERNELS_PORTABLE_H
+
+#ifdef __OPENCL_VERSION__
+
+#pragma OPENCL FP_CONTRACT OFF
+#ifdef QP_REAL_DOUBLE
+#pragma OPENCL EXTENSION cl_khr_fp64 : enable
+#endif
+#define QP_NAME(name) name
+#define QP_FUNCTION static inline
+#define QP_GROUP /* a kernel's last parameter on the host: which work-group it is */
+
+#else
+
+#include <math.h>
+#include <stddef.h>
+#include <stdint.h>
+#ifdef __clang__
+#pragma STDC FP_CONTRACT OFF
+#endif
+#define __kernel static
+#define __global
+#define __local
+#define CLK_LOCAL_MEM_FENCE 0
+#define barrier(fence) ((void)0)
+#define get_group_id(dimension) (qp_group)
+#define get_local_id(dimension) 0u
+#define get_local_size(dimension) 1u
+#define QP_FUNCTION static inline
+#define QP_GROUP , size_t qp_group
+#define uint uint32_t
+#define ulong uint64_t
+#define uchar uint8_t
+
+#endif
+
+/* What the surface's plans contain; a program is built without the rest. */
+#ifndef QP_WITH_INTERNAL
+#define QP_WITH_INTERNAL 1
+#endif
+#ifndef QP_WITH_CREASE
+#define QP_WITH_CREASE 1
+#endif
+#ifndef QP_WITH_TERMINAL
+#define QP_WITH_TERMINAL 1
+#endif
+#ifndef QP_WITH_CORNERS
+#define QP_WITH_CORNERS 1
+#endif
+
+#endif

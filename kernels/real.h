@@ -1,0 +1,226 @@
+/* Numbers of one precision (QP_REAL_DOUBLE or not): `real`, `real4` (a point; .w is 0) and `lanes`, QP_LANES
+ * reals that go through the same operations together. In C this file is included once a precision, so it has
+ * no guard and real_end.h undoes its macros. */
+
+#ifdef QP_REAL_DOUBLE
+#define QP_R(constant) constant
+#define QP_TINY 0x1p-900 /* a squared length between these is as good as any; outside, rescale first */
+#define QP_HUGE 0x1p+900
+#define QP_CORRECT_DIVIDE 1
+#else
+#define QP_R(constant) constant##f
+#define QP_TINY 0x1p-90f
+#define QP_HUGE 0x1p+90f
+#endif
+
+#ifdef __OPENCL_VERSION__
+
+#ifdef QP_REAL_DOUBLE
+typedef double real;
+typedef double4 real4;
+#define QP_REAL_NAME double
+#else
+typedef float real;
+typedef float4 real4;
+#define QP_REAL_NAME float
+#endif
+
+QP_FUNCTION real4 make4(real x, real y, real z) {
+    return (real4)(x, y, z, QP_R(0.0));
+}
+#define add4(a, b) ((a) + (b))
+#define sub4(a, b) ((a) - (b))
+#define scale4(a, s) ((a) * (s))
+#define fma4(a, s, c) fma((a), (real4)(s), (c))
+
+/* The host passes the width that the device's registers like. */
+#ifndef QP_LANES
+#define QP_LANES 1
+#endif
+#define QP_JOIN_(a, b) a##b
+#define QP_JOIN(a, b) QP_JOIN_(a, b)
+#if QP_LANES == 1
+typedef real lanes;
+#define load_lanes(p) (*(p))
+#define load_lanes_uv(p) ((real) * (p))
+#define store_lanes(v, p) (*(p) = (v))
+#define lanes_within(a, low, high) ((a) > (low) && (a) < (high))
+#else
+typedef QP_JOIN(QP_REAL_NAME, QP_LANES) lanes;
+#define load_lanes(p) QP_JOIN(vload, QP_LANES)(0, (p))
+#define load_lanes_uv(p) QP_JOIN(convert_, QP_JOIN(QP_REAL_NAME, QP_LANES))(QP_JOIN(vload, QP_LANES)(0, (p)))
+#define store_lanes(v, p) QP_JOIN(vstore, QP_LANES)((v), 0, (p))
+#define lanes_within(a, low, high) all((a) > (lanes)(low) && (a) < (lanes)(high))
+#endif
+#define splat(x) ((lanes)(x))
+#define neg_lanes(a) (-(a))
+#define add_lanes(a, b) ((a) + (b))
+#define sub_lanes(a, b) ((a) - (b))
+#define mul_lanes(a, b) ((a) * (b))
+#define fma_lanes(a, b, c) fma((a), (b), (c))
+
+#ifdef QP_CORRECT_DIVIDE
+
+#define qp_div(a, b) ((a) / (b))
+#define qp_sqrt(a) sqrt(a)
+#define div_lanes(a, b) ((a) / (b))
+#define sqrt_lanes(a) sqrt(a)
+
+#else
+
+/* A device without correctly rounded division and square root is off by some ulp; the residual, which fma
+ * gives exactly, tells which neighbour is nearest. For operands well inside the range of float, as all here
+ * are. */
+QP_FUNCTION real qp_div(real a, real b) {
+    real q = a / b;
+    q = fma(fma(-q, b, a), 1.0f / b, q);
+    real best = fabs(fma(-q, b, a)), up = nextafter(q, INFINITY), down = nextafter(q, -INFINITY);
+    real up_rest = fabs(fma(-up, b, a)), down_rest = fabs(fma(-down, b, a));
+    return up_rest < best ? up : down_rest < best ? down : q;
+}
+QP_FUNCTION real qp_sqrt(real a) {
+    if (!(a > 0.0f)) return a;
+    real s = sqrt(a);
+    s = fma(fma(-s, s, a), 0.5f / s, s);
+    /* a lies between the squares of the midpoints s +- ulp/2 of the nearest s: compare a - s*s with +- s*ulp.
+     */
+    real up = nextafter(s, INFINITY), down = nextafter(s, 0.0f);
+    real rest = fma(-s, s, a);
+    if (rest > s * (up - s)) return up;
+    if (rest <= -s * (s - down)) return down;
+    return s;
+}
+#if QP_LANES == 1
+#define div_lanes(a, b) qp_div((a), (b))
+#define sqrt_lanes(a) qp_sqrt(a)
+#else
+QP_FUNCTION lanes div_lanes(lanes a, lanes b) {
+    real x[QP_LANES], y[QP_LANES];
+    store_lanes(a, x);
+    store_lanes(b, y);
+    for (uint i = 0; i < QP_LANES; ++i) x[i] = qp_div(x[i], y[i]);
+    return load_lanes(x);
+}
+QP_FUNCTION lanes sqrt_lanes(lanes a) {
+    real x[QP_LANES];
+    store_lanes(a, x);
+    for (uint i = 0; i < QP_LANES; ++i) x[i] = qp_sqrt(x[i]);
+    return load_lanes(x);
+}
+#endif
+#endif
+
+#else /* C11 */
+
+#ifdef QP_REAL_DOUBLE
+#define QP_NAME(name) name##_double
+#define real double
+#define QP_LANES 8u
+#define qp_fma(a, b, c) __builtin_fma((a), (b), (c))
+#define qp_sqrt(a) __builtin_sqrt(a)
+#define fabs(a) __builtin_fabs(a)
+#else
+#define QP_NAME(name) name##_float
+#define real float
+#define QP_LANES 16u
+#define qp_fma(a, b, c) __builtin_fmaf((a), (b), (c))
+#define qp_sqrt(a) __builtin_sqrtf(a)
+#define fabs(a) __builtin_fabsf(a)
+#endif
+#define fma(a, b, c) qp_fma(a, b, c)
+#define qp_div(a, b) ((a) / (b))
+
+#define real4 QP_NAME(real4)
+#define make4 QP_NAME(make4)
+#define add4 QP_NAME(add4)
+#define sub4 QP_NAME(sub4)
+#define scale4 QP_NAME(scale4)
+#define fma4 QP_NAME(fma4)
+typedef struct real4 {
+    real x, y, z, w;
+} real4;
+QP_FUNCTION real4 make4(real x, real y, real z) {
+    return (real4){x, y, z, 0};
+}
+QP_FUNCTION real4 add4(real4 a, real4 b) {
+    return (real4){a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w};
+}
+QP_FUNCTION real4 sub4(real4 a, real4 b) {
+    return (real4){a.x - b.x, a.y - b.y, a.z - b.z, a.w - b.w};
+}
+QP_FUNCTION real4 scale4(real4 a, real s) {
+    return (real4){a.x * s, a.y * s, a.z * s, a.w * s};
+}
+QP_FUNCTION real4 fma4(real4 a, real s, real4 c) {
+    return (real4){fma(a.x, s, c.x), fma(a.y, s, c.y), fma(a.z, s, c.z), fma(a.w, s, c.w)};
+}
+
+#define lanes QP_NAME(lanes)
+#define load_lanes QP_NAME(load_lanes)
+#define load_lanes_uv QP_NAME(load_lanes_uv)
+#define store_lanes QP_NAME(store_lanes)
+#define lanes_within QP_NAME(lanes_within)
+#define splat QP_NAME(splat)
+#define neg_lanes QP_NAME(neg_lanes)
+#define add_lanes QP_NAME(add_lanes)
+#define sub_lanes QP_NAME(sub_lanes)
+#define mul_lanes QP_NAME(mul_lanes)
+#define fma_lanes QP_NAME(fma_lanes)
+#define div_lanes QP_NAME(div_lanes)
+#define sqrt_lanes QP_NAME(sqrt_lanes)
+typedef struct lanes {
+    real v[QP_LANES];
+} lanes;
+QP_FUNCTION lanes splat(real x) {
+    lanes r;
+    for (uint i = 0; i < QP_LANES; ++i) r.v[i] = x;
+    return r;
+}
+QP_FUNCTION lanes load_lanes(const real *p) {
+    lanes r;
+    for (uint i = 0; i < QP_LANES; ++i) r.v[i] = p[i];
+    return r;
+}
+QP_FUNCTION lanes load_lanes_uv(const float *p) {
+    lanes r;
+    for (uint i = 0; i < QP_LANES; ++i) r.v[i] = p[i];
+    return r;
+}
+QP_FUNCTION void store_lanes(lanes a, real *p) {
+    for (uint i = 0; i < QP_LANES; ++i) p[i] = a.v[i];
+}
+QP_FUNCTION int lanes_within(lanes a, real low, real high) {
+    int good = 1;
+    for (uint i = 0; i < QP_LANES; ++i) good &= a.v[i] > low && a.v[i] < high;
+    return good;
+}
+QP_FUNCTION lanes neg_lanes(lanes a) {
+    for (uint i = 0; i < QP_LANES; ++i) a.v[i] = -a.v[i];
+    return a;
+}
+QP_FUNCTION lanes add_lanes(lanes a, lanes b) {
+    for (uint i = 0; i < QP_LANES; ++i) a.v[i] += b.v[i];
+    return a;
+}
+QP_FUNCTION lanes sub_lanes(lanes a, lanes b) {
+    for (uint i = 0; i < QP_LANES; ++i) a.v[i] -= b.v[i];
+    return a;
+}
+QP_FUNCTION lanes mul_lanes(lanes a, lanes b) {
+    for (uint i = 0; i < QP_LANES; ++i) a.v[i] *= b.v[i];
+    return a;
+}
+QP_FUNCTION lanes fma_lanes(lanes a, lanes b, lanes c) {
+    for (uint i = 0; i < QP_LANES; ++i) c.v[i] = fma(a.v[i], b.v[i], c.v[i]);
+    return c;
+}
+QP_FUNCTION lanes div_lanes(lanes a, lanes b) {
+    for (uint i = 0; i < QP_LANES; ++i) a.v[i] /= b.v[i];
+    return a;
+}
+QP_FUNCTION lanes sqrt_lanes(lanes a) {
+    for (uint i = 0; i < QP_LANES; ++i) a.v[i] = qp_sqrt(a.v[i]);
+    return a;
+}
+
+#endif

@@ -1,0 +1,92 @@
+/* The fast pass of section 7.1: patches of the regular plan, straight from the base vertices. No control
+ * points are stored and there is no tree; each work-item takes QP_LANES samples at once. Gives the same bits
+ * as hull and domain through the regular plan, whose weights are the identity. */
+
+__kernel void QP_NAME(regular)(__global const uint *rings, __global const real *positions,
+                               __global const uint *entries, uint first_entry, __global const float *grid_u,
+                               __global const float *grid_v, __global real *vertices,
+                               __global uchar *flags QP_GROUP) {
+    __global const uint *entry = entries + ((ulong)first_entry + get_group_id(0)) * QP_ENTRY_WORDS;
+    __global const uint *ring = rings + QP_ENTRY_WIDE(entry, QP_ENTRY_RING);
+    __global const float *us = grid_u + QP_ENTRY_WIDE(entry, QP_ENTRY_GRID);
+    __global const float *vs = grid_v + QP_ENTRY_WIDE(entry, QP_ENTRY_GRID);
+    __global const real *base = positions + 3u * (ulong)ring[0];
+    const real4 origin = make4(base[0], base[1], base[2]);
+    const ulong out = QP_ENTRY_WIDE(entry, QP_ENTRY_OUT);
+    const uint rotation = entry[QP_ENTRY_ROTATION];
+    const uint samples = entry[QP_ENTRY_SAMPLES];
+    real point[3][16];
+    for (uint j = 0; j < 16u; ++j) {
+        __global const real *p = positions + 3u * (ulong)ring[j];
+        /* + 0 makes +0 of -0, as the hull's sum does. */
+        point[0][j] = p[0] - origin.x + QP_R(0.0);
+        point[1][j] = p[1] - origin.y + QP_R(0.0);
+        point[2][j] = p[2] - origin.z + QP_R(0.0);
+    }
+
+    const uint step = (uint)get_local_size(0) * QP_LANES;
+    for (uint i = (uint)get_local_id(0) * QP_LANES; i < samples; i += step) {
+        /* Reads up to QP_LANES - 1 points past the grid: the next one's, or the padding of the buffer. */
+        lanes u = load_lanes_uv(us + i), v = load_lanes_uv(vs + i);
+        const lanes one = splat(QP_R(1.0));
+        if (rotation != 0) {
+            const lanes a = u, b = v;
+            u = rotation == 1u ? b : sub_lanes(one, rotation == 2u ? a : b);
+            v = rotation == 3u ? a : sub_lanes(one, rotation == 1u ? a : b);
+        }
+        lanes bu[4], du[4], bv[4], dv[4], p[3], su[3], sv[3], n[3];
+        QP_NAME(basis_lanes)(u, bu, du);
+        QP_NAME(basis_lanes)(v, bv, dv);
+        for (uint c = 0; c < 3u; ++c) {
+            for (uint j = 0; j < 4u; ++j) {
+                const real *q = point[c] + 4u * j;
+                lanes along = mul_lanes(splat(q[0]), bu[0]), slope = mul_lanes(splat(q[0]), du[0]);
+                for (uint k = 1; k < 4u; ++k) {
+                    along = fma_lanes(splat(q[k]), bu[k], along);
+                    slope = fma_lanes(splat(q[k]), du[k], slope);
+                }
+                p[c] = j == 0 ? mul_lanes(along, bv[0]) : fma_lanes(along, bv[j], p[c]);
+                su[c] = j == 0 ? mul_lanes(slope, bv[0]) : fma_lanes(slope, bv[j], su[c]);
+                sv[c] = j == 0 ? mul_lanes(along, dv[0]) : fma_lanes(along, dv[j], sv[c]);
+            }
+        }
+        /* unit_normal() for lanes. */
+        for (uint c = 0; c < 3u; ++c) {
+            const uint y = c == 2u ? 0u : c + 1u, z = c == 0u ? 2u : c - 1u;
+            const lanes cd = mul_lanes(su[z], sv[y]);
+            const lanes rest = fma_lanes(neg_lanes(su[z]), sv[y], cd);
+            n[c] = add_lanes(fma_lanes(su[y], sv[z], neg_lanes(cd)), rest);
+        }
+        const lanes length2 = fma_lanes(n[2], n[2], fma_lanes(n[1], n[1], mul_lanes(n[0], n[0])));
+        const lanes inverse = div_lanes(one, sqrt_lanes(length2));
+        real result[6][QP_LANES];
+        uchar flag[QP_LANES];
+        store_lanes(add_lanes(splat(origin.x), p[0]), result[0]);
+        store_lanes(add_lanes(splat(origin.y), p[1]), result[1]);
+        store_lanes(add_lanes(splat(origin.z), p[2]), result[2]);
+        for (uint c = 0; c < 3u; ++c) store_lanes(mul_lanes(n[c], inverse), result[3u + c]);
+        for (uint l = 0; l < QP_LANES; ++l) flag[l] = 0;
+        if (!lanes_within(length2, QP_TINY, QP_HUGE)) {
+            real slopes[6][QP_LANES];
+            for (uint c = 0; c < 3u; ++c) {
+                store_lanes(su[c], slopes[c]);
+                store_lanes(sv[c], slopes[3u + c]);
+            }
+            for (uint l = 0; l < QP_LANES; ++l) {
+                uint f = 0;
+                const real4 m = QP_NAME(unit_normal)(make4(slopes[0][l], slopes[1][l], slopes[2][l]),
+                                                     make4(slopes[3][l], slopes[4][l], slopes[5][l]), &f);
+                result[3][l] = m.x;
+                result[4][l] = m.y;
+                result[5][l] = m.z;
+                flag[l] = (uchar)f;
+            }
+        }
+        const uint block = samples - i < QP_LANES ? samples - i : QP_LANES;
+        for (uint l = 0; l < block; ++l) {
+            const real4 q = make4(result[0][l], result[1][l], result[2][l]);
+            const real4 m = make4(result[3][l], result[4][l], result[5][l]);
+            QP_NAME(write_sample)(vertices, flags, out + i + l, q, m, flag[l]);
+        }
+    }
+}

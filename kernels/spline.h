@@ -1,0 +1,128 @@
+/* The uniform bicubic B-spline, and normals: what every leaf of a plan ends in. Included once a precision in
+ * C. */
+
+/* Cubic B-spline basis at t in [0,1], and its derivative. */
+QP_FUNCTION void QP_NAME(basis)(real t, real b[4], real d[4]) {
+    real s = QP_R(1.0) - t;
+    real t2 = t * t, s2 = s * s;
+    b[0] = s2 * s * QP_R(0.16666666666666666667);
+    b[1] = fma(t2, fma(QP_R(0.5), t, QP_R(-1.0)), QP_R(0.66666666666666666667));
+    b[2] = fma(s2, fma(QP_R(0.5), s, QP_R(-1.0)), QP_R(0.66666666666666666667));
+    b[3] = t2 * t * QP_R(0.16666666666666666667);
+    d[0] = s2 * QP_R(-0.5);
+    d[1] = t * fma(QP_R(1.5), t, QP_R(-2.0));
+    d[2] = s * fma(QP_R(-1.5), s, QP_R(2.0));
+    d[3] = t2 * QP_R(0.5);
+}
+
+/* basis() for lanes: the same operations in the same order. */
+QP_FUNCTION void QP_NAME(basis_lanes)(lanes t, lanes b[4], lanes d[4]) {
+    lanes s = sub_lanes(splat(QP_R(1.0)), t);
+    lanes t2 = mul_lanes(t, t), s2 = mul_lanes(s, s);
+    lanes sixth = splat(QP_R(0.16666666666666666667)), most = splat(QP_R(0.66666666666666666667));
+    lanes half = splat(QP_R(0.5)), minus_one = splat(QP_R(-1.0));
+    b[0] = mul_lanes(mul_lanes(s2, s), sixth);
+    b[1] = fma_lanes(t2, fma_lanes(half, t, minus_one), most);
+    b[2] = fma_lanes(s2, fma_lanes(half, s, minus_one), most);
+    b[3] = mul_lanes(mul_lanes(t2, t), sixth);
+    d[0] = mul_lanes(s2, splat(QP_R(-0.5)));
+    d[1] = mul_lanes(t, fma_lanes(splat(QP_R(1.5)), t, splat(QP_R(-2.0))));
+    d[2] = mul_lanes(s, fma_lanes(splat(QP_R(-1.5)), s, splat(QP_R(2.0))));
+    d[3] = mul_lanes(t2, half);
+}
+
+/* Position and derivatives in one leaf, relative to the patch origin; derivatives in the leaf's own frame and
+ * scale, which is all that a normal needs. */
+typedef struct QP_NAME(surface_point) {
+    real4 p, du, dv;
+    uint flags;
+} QP_NAME(surface_point);
+
+/* Adds row j of a 4x4 grid of points: bu, du weigh the row's points; bv, dv the row. Rows first, then across:
+ * every path through the kernels keeps this order, so that all give the same bits. */
+QP_FUNCTION void QP_NAME(add_row)(QP_NAME(surface_point) * s, int first, real4 p0, real4 p1, real4 p2,
+                                  real4 p3, const real bu[4], const real du[4], real bv, real dv) {
+    real4 along = fma4(p3, bu[3], fma4(p2, bu[2], fma4(p1, bu[1], scale4(p0, bu[0]))));
+    real4 slope = fma4(p3, du[3], fma4(p2, du[2], fma4(p1, du[1], scale4(p0, du[0]))));
+    if (first) {
+        s->p = scale4(along, bv);
+        s->du = scale4(slope, bv);
+        s->dv = scale4(along, dv);
+    } else {
+        s->p = fma4(along, bv, s->p);
+        s->du = fma4(slope, bv, s->du);
+        s->dv = fma4(along, dv, s->dv);
+    }
+}
+
+/* a b - c d to within an ulp or so, exactly 0 for equal products (Kahan). */
+QP_FUNCTION real QP_NAME(difference_of_products)(real a, real b, real c, real d) {
+    real cd = c * d;
+    real rest = fma(-c, d, cd);
+    return fma(a, b, -cd) + rest;
+}
+QP_FUNCTION real4 QP_NAME(cross_product)(real4 a, real4 b) {
+    return make4(QP_NAME(difference_of_products)(a.y, b.z, a.z, b.y),
+                 QP_NAME(difference_of_products)(a.z, b.x, a.x, b.z),
+                 QP_NAME(difference_of_products)(a.x, b.y, a.y, b.x));
+}
+
+/* Divides a vector by the power of two of its largest component (exact), so that products of its components
+ * neither overflow nor vanish. False when it is zero or not finite. */
+QP_FUNCTION int QP_NAME(rescale)(real4 *a) {
+    real x = fabs(a->x), y = fabs(a->y), z = fabs(a->z);
+    real most = x > y ? x : y;
+    most = most > z ? most : z;
+    /* The sum catches a NaN that the comparisons passed over. */
+    if (!(most > QP_R(0.0)) || !(x + y + z < (real)INFINITY)) return 0;
+    int power = -ilogb(most);
+    *a = make4(ldexp(a->x, power), ldexp(a->y, power), ldexp(a->z, power));
+    return 1;
+}
+
+/* Unit vector along du x dv. Zero and QP_FLAG_NO_NORMAL where they are parallel, zero or not finite. */
+QP_FUNCTION real4 QP_NAME(unit_normal)(real4 du, real4 dv, uint *flags) {
+    real4 n = QP_NAME(cross_product)(du, dv);
+    real length2 = fma(n.z, n.z, fma(n.y, n.y, n.x * n.x));
+    if (!(length2 > QP_TINY && length2 < QP_HUGE)) {
+        int good = QP_NAME(rescale)(&du) && QP_NAME(rescale)(&dv);
+        if (good) {
+            n = QP_NAME(cross_product)(du, dv);
+            good = QP_NAME(rescale)(&n);
+        }
+        if (!good) {
+            *flags |= QP_FLAG_NO_NORMAL;
+            return make4(QP_R(0.0), QP_R(0.0), QP_R(0.0));
+        }
+        length2 = fma(n.z, n.z, fma(n.y, n.y, n.x * n.x));
+    }
+    return scale4(n, qp_div(QP_R(1.0), qp_sqrt(length2)));
+}
+
+/* Turns (u,v) by rotation r, see plan_layout.h; exact, since u and v are multiples of 2^-24. */
+QP_FUNCTION void QP_NAME(rotate_uv)(uint r, real *u, real *v) {
+    real a = *u, b = *v;
+    if (r == 1u) {
+        *u = b;
+        *v = QP_R(1.0) - a;
+    } else if (r == 2u) {
+        *u = QP_R(1.0) - a;
+        *v = QP_R(1.0) - b;
+    } else if (r == 3u) {
+        *u = QP_R(1.0) - b;
+        *v = a;
+    }
+}
+
+/* Writes sample i: 6 reals and a byte of flags. */
+QP_FUNCTION void QP_NAME(write_sample)(__global real *vertices, __global uchar *flags, ulong i, real4 p,
+                                       real4 n, uint f) {
+    __global real *out = vertices + 6u * i;
+    out[0] = p.x;
+    out[1] = p.y;
+    out[2] = p.z;
+    out[3] = n.x;
+    out[4] = n.y;
+    out[5] = n.z;
+    flags[i] = (uchar)f;
+}
