@@ -157,12 +157,12 @@ QP_FUNCTION void QP_NAME(eval_tree)(__global const uint *tree, __global const re
 #endif
 #if QP_WITH_TERMINAL
         if (kind == QP_NODE_TERMINAL) {
-            const uint rings = QP_NODE_RINGS(word), origin = node[1];
+            const uint rings = QP_NODE_RINGS(word), absolute = QP_NODE_ABSOLUTE_RINGS(word), origin = node[1];
             __global const uint *ring = node + 3;
             QP_NAME(rotate_uv)(QP_NODE_ROTATION(word), &u, &v);
             for (uint k = 0; k < rings; ++k, ring += 12) {
                 if (u >= QP_R(0.5) || v >= QP_R(0.5)) {
-                    QP_NAME(eval_ring)(support, ring, origin, u, v, s);
+                    QP_NAME(eval_ring)(support, ring, k < absolute ? QP_NO_POINT : origin, u, v, s);
                     return;
                 }
                 u = QP_R(2.0) * u;
@@ -170,8 +170,10 @@ QP_FUNCTION void QP_NAME(eval_tree)(__global const uint *tree, __global const re
             }
 #if QP_WITH_CORNERS
             last_ring = rings == 0 ? 0 : ring - 12;
-            last_origin = origin;
+            last_origin = rings <= absolute ? QP_NO_POINT : origin;
 #endif
+            /* The tail is in the frame that this node was entered in; an extraordinary corner turns itself. */
+            QP_NAME(rotate_uv)((4u - QP_NODE_ROTATION(word)) & 3u, &u, &v);
             node = tree + node[2];
             continue;
         }
@@ -186,6 +188,7 @@ QP_FUNCTION void QP_NAME(eval_tree)(__global const uint *tree, __global const re
 #if QP_WITH_CORNERS
 #if QP_WITH_TERMINAL
         if (kind == QP_NODE_EXTRAORDINARY) {
+            QP_NAME(rotate_uv)(QP_NODE_ROTATION(word), &u, &v);
             QP_NAME(eval_extraordinary)(support, node, last_ring, last_origin, u, v, s);
             return;
         }

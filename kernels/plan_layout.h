@@ -39,32 +39,32 @@
 #define QP_PLAN_INTERNAL 8u /* has internal nodes */
 #define QP_PLAN_CORNERS 16u /* has extraordinary or irregular leaves */
 
-/* Word 0 of a node: kind in bits 0..2, rotation in bits 3..4 (crease, terminal), tie_u in bit 5, tie_v in bit
- * 6 (internal), count of ring levels in bits 8..15 (terminal). Node-local (u,v) runs over [0,1]^2 in every
- * node; going down doubles it (exactly). Rotation r turns the node's (u,v) as the patch rotation above does,
- * so that the crease edge is v=0 / the extraordinary corner is (0,0). Point indices are 16 bits, two a word,
- * low half first.
+/* Word 0 of a node: kind in bits 0..2, rotation in bits 3..4 (crease, terminal, extraordinary), tie_u in bit 5,
+ * tie_v in bit 6 (internal); of a terminal the count of its rings in bits 8..15 and in bits 16..23 how many of them,
+ * the first ones, have absolute points.
+ * Node-local (u,v) runs over [0,1]^2 in every node; going down doubles it (exactly). Rotation r turns the node's
+ * (u,v) as the patch rotation above does, so that the crease edge is v=0 / the extraordinary corner is (0,0).
+ * Point indices are 16 bits, two a word, low half first.
  *
- * REGULAR        word 1: origin point or QP_NO_POINT. words 2..9: 16 points, row-major (v outer, u inner) of
- * the uniform bicubic B-spline whose domain is the node. CREASE         word 1: origin or QP_NO_POINT.
- * words 2..9: as REGULAR, in the rotated frame (crease along v=0). word 10: offset of QP_CREASE_REALS
- * constants in reals (relative to QP_HEAD_REALS): [0] v0, [1] v1: zone 0 is v >= v0, zone 1 is v1 <= v < v0,
- * zone 2 is v < v1; [2..4] scale of each zone; then three 4x4 matrices M (row-major). In zone z the weights
- * of the four rows of points are  w[j] = sum_i B_i(v * scale_z) * M_z[i][j], B the cubic B-spline basis (and
- *                derivative: d/dv = scale_z * B').
- * INTERNAL       words 1..4: nodes of the children (u<.5,v<.5), (u>=.5,v<.5), (u<.5,v>=.5), (u>=.5,v>=.5).
- *                At exactly .5 the child is the upper one, or the lower one where tie_u / tie_v is set.
- * TERMINAL       word 1: origin point (offset rows, see above) or QP_NO_POINT. word 2: node of the remaining
- * corner cell. Then 12 words a ring level: 24 points of the 5x5 grid row-major (v outer) without (0,0): slot
- * of (i,j) is 5*j+i-1. At each ring level: if u >= .5 or v >= .5 the sample lies in one of three regular
- *                sub-domains, with cx = u>=.5, cy = v>=.5 its 16 points are (cx+a, cy+b), a,b in 0..3, its
- *                (u,v) is 2u-cx, 2v-cy; else (u,v) doubles and the next ring level follows, or at last word
- * 2's node. EXTRAORDINARY  follows a TERMINAL only, in its rotated frame. words 1..3: limit position, first
- * and second tangent points (cross(t1,t2) points along the normal; QP_NO_POINT tangents: no tangent plane).
- * Exact at (0,0); elsewhere the sample is past the plan's depth: radial blend between the limit point and the
- * terminal's last ring. IRREGULAR      words 1..6: 12 points: limit position, t1, t2 of the corners (0,0),
- * (1,0), (1,1), (0,1), QP_NO_POINT where a tangent is undefined. Exact at the corners; elsewhere past depth:
- * bilinear blend. */
+ * REGULAR: word 1: origin point or QP_NO_POINT. words 2..9: 16 points, row-major (v outer, u inner), of the uniform
+ *   bicubic B-spline whose domain is the node.
+ * CREASE: word 1: origin or QP_NO_POINT. words 2..9: as REGULAR, in the rotated frame (crease along v=0).
+ *   word 10: offset of QP_CREASE_REALS constants in reals (relative to QP_HEAD_REALS): [0] v0, [1] v1: zone 0 is
+ *   v >= v0, zone 1 is v1 <= v < v0, zone 2 is v < v1; [2..4] scale of each zone; then three 4x4 matrices M
+ *   (row-major). In zone z the weights of the four rows of points are w[j] = sum_i B_i(v * scale_z) * M_z[i][j],
+ *   B the cubic B-spline basis (and derivative: d/dv = scale_z * B').
+ * INTERNAL: words 1..4: nodes of the children (u<.5,v<.5), (u>=.5,v<.5), (u<.5,v>=.5), (u>=.5,v>=.5).
+ *   At exactly .5 the child is the upper one, or the lower one where tie_u / tie_v is set.
+ * TERMINAL: word 1: origin point (offset rows, see above) or QP_NO_POINT; rings before ABSOLUTE_RINGS do not add it.
+ *   word 2: node of the remaining corner cell, in the frame that the terminal was entered in. Then 12 words a ring: 24 points of the 5x5 grid, row-major (v outer),
+ *   without (0,0): slot of (i,j) is 5*j+i-1. At each ring: if u >= .5 or v >= .5 the sample lies in one of three
+ *   regular sub-domains, with cx = u>=.5, cy = v>=.5 its 16 points are (cx+a, cy+b), a,b in 0..3, and its (u,v) is
+ *   2u-cx, 2v-cy; else (u,v) doubles and the next ring follows, or at last word 2's node.
+ * EXTRAORDINARY: follows a TERMINAL only, in its rotated frame. words 1..3: limit position, first and second tangent
+ *   points (cross(t1,t2) points along the normal; QP_NO_POINT tangents: no tangent plane). Exact at (0,0); elsewhere
+ *   the sample is past the plan's depth: radial blend between the limit point and the terminal's last ring.
+ * IRREGULAR: words 1..6: 12 points: limit position, t1, t2 of the corners (0,0), (1,0), (1,1), (0,1), QP_NO_POINT
+ *   where a tangent is undefined. Exact at the corners; elsewhere past depth: bilinear blend. */
 #define QP_NODE_INTERNAL 0u
 #define QP_NODE_REGULAR 1u
 #define QP_NODE_CREASE 2u
@@ -77,6 +77,7 @@
 #define QP_NODE_TIE_U(w) (((w) >> 5) & 1u)
 #define QP_NODE_TIE_V(w) (((w) >> 6) & 1u)
 #define QP_NODE_RINGS(w) (((w) >> 8) & 255u)
+#define QP_NODE_ABSOLUTE_RINGS(w) (((w) >> 16) & 255u)
 
 #define QP_NO_POINT 0xffffu
 #define QP_CREASE_REALS 53u
