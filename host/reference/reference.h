@@ -6,14 +6,18 @@
 #include "host/mesh/mesh.h"
 
 typedef struct qp_reference_sample {
-    double p[3], du[3], dv[3]; /* du, dv with respect to the patch's own (u,v) in [0,1]^2 */
-    double n[3];               /* unit normal, or 0 where undefined */
+    /* du, dv with respect to the patch's own (u,v) in [0,1]^2. At a corner of an irregular cell they span the
+     * tangent plane, and are the one-sided derivatives where those are finite and not zero, else tangents of
+     * any length; 0 where there is no tangent plane. */
+    double p[3], du[3], dv[3];
+    double n[3];         /* unit normal, or 0 where undefined */
     bool normal_defined; /* false where the surface has no tangent plane, or it is too ill-conditioned to tell
                           */
 } qp_reference_sample;
 
 /* Limit position, derivatives and normal of one patch at count points uv[2*i], uv[2*i+1] in [0,1]; exact at
- * any of them, corners of extraordinary vertices included. Thread-safe: reads the mesh only. positions: 3 a
+ * any of them, corners of extraordinary vertices included. QP_BAD_INPUT for a patch without surface (a
+ * hole) and for points outside the square. Thread-safe: reads the mesh only. positions: 3 a
  * vertex, usually mesh->positions (or their float-rounded values, so that float evaluation is measured
  * against what it was given). */
 qp_status qp_reference_eval(const qp_mesh *mesh, const double *positions, uint32_t patch, size_t count,
@@ -32,13 +36,18 @@ typedef struct qp_error_report {
     double past_normal_max_deg;
 } qp_error_report;
 
-/* Compares a vertex stream with the reference, in parallel over patches. Samples flagged QP_SAMPLE_PAST_DEPTH
- * are counted apart. */
+/* Compares a vertex stream with the reference, in parallel over patches; the report is the same for any
+ * number of threads. Samples flagged QP_SAMPLE_PAST_DEPTH are counted apart. Float streams are compared with
+ * the surface of the positions rounded to float, which is what the kernels were given, double streams with
+ * that of the positions themselves. A sample that has no normal where the reference has one counts as 180
+ * degrees off; samples that are not finite are counted and left out of the measures. QP_BAD_INPUT when a
+ * sample lies on a patch without surface or outside [0,1]^2. */
 qp_status qp_reference_compare(const qp_mesh *mesh, const qp_stream *stream, qp_error_report *report,
                                qp_error *err);
 
-/* Sample sets. Arrays are malloced for the caller. kind "corner": (u,v) in {0, 2^-k} offsets about every
- * corner of every patch, k = 1..24; "random": count low-discrepancy points over all patches with a surface,
+/* Sample sets. Arrays are malloced for the caller; nothing is held on failure. kind "corner": (u,v) in
+ * {0, 2^-k} offsets about every corner of every patch with a surface, k = 1..24 (count and seed are not
+ * used); "random": count low-discrepancy points over all patches with a surface,
  * multiples of 2^-24. */
 typedef struct qp_sample_set {
     uint64_t count;
