@@ -8,9 +8,10 @@
 #define ONE 65536u
 
 typedef struct qp_final_point {
-    uint8_t need;   /* first level that needs it */
-    uint8_t kind;   /* QP_POINT_* | depth << 2 */
-    uint32_t order; /* becomes its index once sorted */
+    uint8_t need;    /* first level that needs it */
+    uint8_t kind;    /* QP_POINT_* | depth << 2 */
+    uint16_t origin; /* point its row is an offset from, or QP_NO_POINT */
+    uint32_t order;  /* becomes its index once sorted */
 } qp_final_point;
 
 /* One dimension of a cell: [lo, hi], and whether a sample at either end comes here or goes to the neighbour.
@@ -64,6 +65,7 @@ void qp_plan_free(qp_plan *plan) {
     free(plan->weights);
     free(plan->constants);
     free(plan->point_kinds);
+    free(plan->point_origins);
     free(plan);
 }
 
@@ -116,7 +118,7 @@ static uint32_t new_final(qp_builder *b, uint8_t need, uint32_t kind) {
         b->too_large = true;
         return 0;
     }
-    b->points[b->point_count] = (qp_final_point){need, (uint8_t)kind, b->point_count};
+    b->points[b->point_count] = (qp_final_point){need, (uint8_t)kind, QP_NO_POINT, b->point_count};
     return b->point_count++;
 }
 
@@ -255,6 +257,7 @@ static uint32_t put_terminal(qp_builder *b, const qp_chain *chain, uint32_t orig
             bool seen = false;
             for (uint32_t l = 0; l < k && !seen; ++l) seen = chain->points[ring][l] == chain->points[ring][k];
             if (seen) continue;
+            b->points[chain->points[ring][k]].origin = (uint16_t)origin;
             double *row = final_row(b, chain->points[ring][k]);
             lower_need(b, origin, b->points[chain->points[ring][k]].need);
             for (uint32_t w = 0; w < width; ++w) row[w] -= base[w];
@@ -490,9 +493,10 @@ static qp_plan *finish(qp_builder *b) {
         plan->weights = qp_alloc((size_t)count * width, sizeof *plan->weights, false);
         plan->constants = qp_alloc(b->constant_count, sizeof *plan->constants, false);
         plan->point_kinds = qp_alloc(count, 1, false);
+        plan->point_origins = qp_alloc(count, sizeof *plan->point_origins, false);
     }
     if (plan == NULL || index == NULL || plan->tree == NULL || plan->weights == NULL ||
-        plan->constants == NULL || plan->point_kinds == NULL) {
+        plan->constants == NULL || plan->point_kinds == NULL || plan->point_origins == NULL) {
         free(index);
         qp_plan_free(plan);
         b->failed = true;
@@ -515,6 +519,10 @@ static qp_plan *finish(qp_builder *b) {
         plan->point_kinds[i] = p->kind;
         memcpy(plan->weights + (size_t)i * width, final_row(b, p->order), width * sizeof(double));
         for (uint32_t n = p->need; n < QP_LEVELS; ++n) ++plan->rows[n];
+    }
+    for (uint32_t i = 0; i < count; ++i) {
+        uint16_t origin = b->points[i].origin;
+        plan->point_origins[i] = origin == QP_NO_POINT ? origin : (uint16_t)index[origin];
     }
     plan->rows[QP_LEVELS - 1] = count;
     renumber_tree(plan, index);

@@ -13,6 +13,7 @@ typedef struct qp_plan {
     uint32_t *tree;           /* [tree_words], root at 0 */
     double *weights;          /* [point_count * ring_size], row-major: a row is one stencil */
     uint8_t *point_kinds;     /* [point_count] what each point is (host/plan/build.h), for info */
+    uint16_t *point_origins;  /* [point_count] point that a row is an offset from, or QP_NO_POINT */
     double *constants; /* [constant_count]; a CREASE node's word 10 is index + point_count * ring_size */
 } qp_plan;
 

@@ -189,7 +189,9 @@ static qp_plan *regular_plan(void) {
     plan->weights = qp_alloc(16 * 16, sizeof *plan->weights, true);
     plan->constants = qp_alloc(0, sizeof *plan->constants, true);
     plan->point_kinds = qp_alloc(16, 1, true);
-    if (plan->tree == NULL || plan->weights == NULL || plan->constants == NULL || plan->point_kinds == NULL) {
+    plan->point_origins = qp_alloc(16, sizeof *plan->point_origins, false);
+    if (plan->tree == NULL || plan->weights == NULL || plan->constants == NULL || plan->point_kinds == NULL ||
+        plan->point_origins == NULL) {
         qp_plan_free(plan);
         return NULL;
     }
@@ -197,6 +199,7 @@ static qp_plan *regular_plan(void) {
     plan->tree[1] = QP_NO_POINT;
     for (uint32_t i = 0; i < 16; ++i) {
         plan->weights[17 * i] = 1.0;
+        plan->point_origins[i] = QP_NO_POINT;
         plan->tree[2 + i / 2] |= i << (i % 2 * 16);
     }
     for (uint32_t n = 0; n < QP_LEVELS; ++n) plan->rows[n] = 16;
