@@ -1,0 +1,140 @@
+/* The C face of OpenImageIO: a few calls, no exception gets out. */
+#include "host/scene/image.h"
+
+extern "C" {
+#include "host/base/output.h"
+}
+
+#include <OpenImageIO/imageio.h>
+
+#include <cctype>
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <exception>
+#include <string>
+
+namespace {
+
+enum class format { png, exr, other };
+
+format format_of(const char *path) {
+    const char *dot = std::strrchr(path, '.');
+    std::string extension;
+    for (; dot != nullptr && *dot != '\0'; ++dot)
+        extension += static_cast<char>(std::tolower(static_cast<unsigned char>(*dot)));
+    return extension == ".png" ? format::png : extension == ".exr" ? format::exr : format::other;
+}
+
+/* The first line of OpenImageIO's pending message. */
+std::string message() {
+    std::string text = OIIO::geterror();
+    return text.substr(0, text.find('\n'));
+}
+
+qp_status write_to(const char *path, const char *file, const qp_image *image, bool png, qp_error *err) {
+    auto output = OIIO::ImageOutput::create(file);
+    if (!output) return qp_fail(err, QP_SYSTEM, "%s: %s", path, message().c_str());
+    OIIO::TypeDesc type = png ? OIIO::TypeDesc::UINT8 : OIIO::TypeDesc::FLOAT;
+    OIIO::ImageSpec spec(static_cast<int>(image->width), static_cast<int>(image->height), 4, type);
+    if (png)
+        spec.attribute("oiio:UnassociatedAlpha", 1);
+    else
+        spec.attribute("compression", "zip");
+    const void *pixels = png ? static_cast<const void *>(image->rgba) : image->rgba_f;
+    bool good = output->open(file, spec) && output->write_image(type, pixels);
+    good = output->close() && good;
+    if (good) return QP_OK;
+    std::string text = output->geterror();
+    return qp_fail(err, QP_SYSTEM, "%s: cannot be written: %s", path,
+                   text.substr(0, text.find('\n')).c_str());
+}
+
+/* Spreads n channels in the first places of each pixel over four. */
+template <typename T> void spread(T *pixels, std::size_t count, int n, T opaque) {
+    for (std::size_t k = count; k-- > 0;) {
+        T in[4];
+        for (int c = 0; c < n; ++c)
+            in[c] = pixels[k * static_cast<std::size_t>(n) + static_cast<std::size_t>(c)];
+        T *out = pixels + 4 * k;
+        bool grey = n < 3;
+        out[0] = in[0];
+        out[1] = grey ? in[0] : in[1];
+        out[2] = grey ? in[0] : in[2];
+        out[3] = n == 4 ? in[3] : n == 2 ? in[1] : opaque;
+    }
+}
+
+qp_status read_from(const char *path, qp_image *image, bool png, qp_error *err) {
+    OIIO::ImageSpec wish;
+    wish.attribute("oiio:UnassociatedAlpha", png ? 1 : 0);
+    auto input = OIIO::ImageInput::open(path, &wish);
+    if (!input) return qp_fail(err, QP_BAD_INPUT, "%s: cannot be read: %s", path, message().c_str());
+    const OIIO::ImageSpec &spec = input->spec();
+    int n = spec.nchannels;
+    if (n < 1 || n > 4 || spec.depth > 1)
+        return qp_fail(err, QP_BAD_INPUT, "%s: %d channels, not one to four", path, n);
+    if (spec.width < 1 || spec.height < 1) return qp_fail(err, QP_BAD_INPUT, "%s: an empty picture", path);
+    qp_status status =
+        qp_image_create(static_cast<uint32_t>(spec.width), static_cast<uint32_t>(spec.height), image, err);
+    if (status != QP_OK) return status;
+    std::size_t count = static_cast<std::size_t>(image->width) * image->height;
+    OIIO::TypeDesc type = png ? OIIO::TypeDesc::UINT8 : OIIO::TypeDesc::FLOAT;
+    if (!input->read_image(0, 0, 0, n, type, png ? static_cast<void *>(image->rgba) : image->rgba_f)) {
+        std::string text = input->geterror();
+        qp_image_free(image);
+        return qp_fail(err, QP_BAD_INPUT, "%s: cannot be read: %s", path,
+                       text.substr(0, text.find('\n')).c_str());
+    }
+    if (png) {
+        spread<uint8_t>(image->rgba, count, n, 255);
+        std::free(image->rgba_f);
+        image->rgba_f = nullptr;
+    } else {
+        spread<float>(image->rgba_f, count, n, 1.0f);
+        std::free(image->rgba);
+        image->rgba = nullptr;
+    }
+    return QP_OK;
+}
+
+} // namespace
+
+extern "C" qp_status qp_image_check_path(const char *path, qp_error *err) {
+    if (format_of(path) != format::other) return QP_OK;
+    return qp_fail(err, QP_BAD_INPUT, "%s: a picture must be named .png or .exr", path);
+}
+
+extern "C" qp_status qp_image_write(const char *path, const qp_image *image, qp_error *err) {
+    qp_status status = qp_image_check_path(path, err);
+    if (status != QP_OK) return status;
+    bool png = format_of(path) == format::png;
+    if (image->width == 0 || image->height == 0 || (png ? image->rgba == nullptr : image->rgba_f == nullptr))
+        return qp_fail(err, QP_BAD_INPUT, "%s: there are no pixels to write", path);
+    char *temporary = qp_output_temporary(path);
+    if (temporary == nullptr) return qp_fail_memory(err, std::strlen(path), "a file name");
+    try {
+        status = write_to(path, temporary, image, png, err);
+    } catch (const std::exception &e) {
+        status = qp_fail(err, QP_SYSTEM, "%s: cannot be written: %s", path, e.what());
+    }
+    if (status == QP_OK && std::rename(temporary, path) != 0)
+        status = qp_fail(err, QP_SYSTEM, "%s: cannot be written: %s", path, std::strerror(errno));
+    if (status != QP_OK) std::remove(temporary);
+    std::free(temporary);
+    return status;
+}
+
+extern "C" qp_status qp_image_read(const char *path, qp_image *image, qp_error *err) {
+    std::memset(image, 0, sizeof *image);
+    qp_status status = qp_image_check_path(path, err);
+    if (status != QP_OK) return status;
+    try {
+        status = read_from(path, image, format_of(path) == format::png, err);
+    } catch (const std::exception &e) {
+        status = qp_fail(err, QP_SYSTEM, "%s: cannot be read: %s", path, e.what());
+    }
+    if (status != QP_OK) qp_image_free(image);
+    return status;
+}
