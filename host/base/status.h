@@ -8,6 +8,10 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Fills *err (when not NULL) and returns status, so that a caller can write `return qp_fail(...)`. */
 qp_status qp_fail(qp_error *err, qp_status status, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
@@ -37,4 +41,7 @@ void qp_parallel(size_t count, size_t chunk,
 /* 64-bit hash of bytes (FNV-1a folded by a multiply-xor finaliser); for tables and stream hashes. */
 uint64_t qp_hash(const void *bytes, size_t length, uint64_t seed);
 
+#ifdef __cplusplus
+}
+#endif
 #endif
