@@ -224,3 +224,30 @@ extern "C" qp_status qp_osd_time_setup(const qp_mesh *mesh, unsigned level, doub
         return QP_OK;
     });
 }
+
+qp_status qp_osd_base_tags(const qp_mesh *mesh, qp_osd_tags *tags, qp_error *err) {
+    return guarded(err, [&]() -> qp_status {
+        std::unique_ptr<Far::TopologyRefiner> refiner = make_refiner(mesh);
+        if (!refiner) return refused(err);
+        const Far::TopologyLevel level = refiner->GetLevel(0);
+        tags->n_edges = (uint32_t)level.GetNumEdges();
+        for (uint32_t i = 0; i < mesh->n_edges; ++i) {
+            const uint32_t *v = mesh->edge_vertices + 2 * (size_t)i;
+            const int e = level.FindEdge((int)v[0], (int)v[1]);
+            if (e < 0) return qp_fail(err, QP_CHECK_FAILED, "OpenSubdiv has no edge %u %u", v[0], v[1]);
+            tags->edge_sharpness[i] = level.GetEdgeSharpness(e);
+            tags->edge_flags[i] = (uint8_t)((level.IsEdgeBoundary(e) ? QP_EDGE_BOUNDARY : 0) |
+                                            (level.IsEdgeNonManifold(e) ? QP_EDGE_NONMANIFOLD : 0));
+        }
+        for (uint32_t v = 0; v < mesh->n_vertices; ++v) {
+            tags->vertex_sharpness[v] = level.GetVertexSharpness((int)v);
+            tags->vertex_flags[v] =
+                (uint8_t)((level.IsVertexBoundary((int)v) ? QP_VERTEX_BOUNDARY : 0) |
+                          (level.IsVertexNonManifold((int)v) ? QP_VERTEX_NONMANIFOLD : 0));
+        }
+        for (uint32_t f = 0; f < mesh->n_faces; ++f) {
+            tags->face_flags[f] = level.IsFaceHole((int)f) ? QP_FACE_HOLE : 0;
+        }
+        return QP_OK;
+    });
+}

@@ -34,6 +34,16 @@ qp_status qp_osd_eval(const qp_osd *osd, uint32_t patch, size_t count, const dou
 qp_status qp_osd_time_setup(const qp_mesh *mesh, unsigned level, double *refine_ms, double *patch_ms,
                             double *stencil_ms, qp_error *err);
 
+/* OpenSubdiv's base level: what it makes of the mesh's faces and tags before any refinement. Arrays of the
+ * mesh's own sizes and numbering, the caller's; flags as mesh.h has them (no QP_VERTEX_UNUSED). *n_edges is its
+ * count of edges. QP_CHECK_FAILED when it lacks an edge of ours. */
+typedef struct qp_osd_tags {
+    uint32_t n_edges;
+    float *edge_sharpness, *vertex_sharpness;
+    uint8_t *edge_flags, *vertex_flags, *face_flags;
+} qp_osd_tags;
+qp_status qp_osd_base_tags(const qp_mesh *mesh, qp_osd_tags *tags, qp_error *err);
+
 #ifdef __cplusplus
 }
 #endif
