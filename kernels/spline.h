@@ -20,15 +20,15 @@ QP_FUNCTION void QP_NAME(basis_lanes)(lanes t, lanes b[4], lanes d[4]) {
     lanes s = sub_lanes(splat(QP_R(1.0)), t);
     lanes t2 = mul_lanes(t, t), s2 = mul_lanes(s, s);
     lanes sixth = splat(QP_R(0.16666666666666666667)), most = splat(QP_R(0.66666666666666666667));
-    lanes half = splat(QP_R(0.5)), minus_one = splat(QP_R(-1.0));
+    lanes one_half = splat(QP_R(0.5)), minus_one = splat(QP_R(-1.0));
     b[0] = mul_lanes(mul_lanes(s2, s), sixth);
-    b[1] = fma_lanes(t2, fma_lanes(half, t, minus_one), most);
-    b[2] = fma_lanes(s2, fma_lanes(half, s, minus_one), most);
+    b[1] = fma_lanes(t2, fma_lanes(one_half, t, minus_one), most);
+    b[2] = fma_lanes(s2, fma_lanes(one_half, s, minus_one), most);
     b[3] = mul_lanes(mul_lanes(t2, t), sixth);
     d[0] = mul_lanes(s2, splat(QP_R(-0.5)));
     d[1] = mul_lanes(t, fma_lanes(splat(QP_R(1.5)), t, splat(QP_R(-2.0))));
     d[2] = mul_lanes(s, fma_lanes(splat(QP_R(-1.5)), s, splat(QP_R(2.0))));
-    d[3] = mul_lanes(t2, half);
+    d[3] = mul_lanes(t2, one_half);
 }
 
 /* Position and derivatives in one leaf, relative to the patch origin; derivatives in the leaf's own frame and
