@@ -4,9 +4,14 @@
  * eigenvector of the local subdivision matrix: eigenvalue 1 for the position, the two next ones for the
  * tangents. Smooth (Halstead, Kass, DeRose 1993): with valence n, position weights n^2, 4, 1 over n(n+5);
  * tangents, with t = 2 pi j / n, A = 1 + cos(2 pi/n) + cos(pi/n) sqrt(18 + 2 cos(2 pi/n)):  edges A cos t,
- * faces cos t + cos(t + 2 pi/n), and the same with sin. Crease of m faces (Biermann, Levin, Zorin 2000),
- * theta = pi/m: along it e_0 - e_m; across it v: 4R(cos theta - 1), ends: -R(1 + 2 cos theta), edge j: 4
- * sin(j theta), face j: sin(j theta) + sin((j+1) theta), R = (cos theta + 1)/sin theta. A dart (one
+ * faces cos t + cos(t + 2 pi/n), and the same with sin. Crease of m faces, theta = pi/m: along
+ * it e_0 - e_m (eigenvalue 1/2); across it the sine mode of the sector. With x on the crease's ends, A sin(j theta) on edge j
+ * and sin(j theta) + sin((j+1) theta) on face j, the face rows of w S = lambda w give lambda = A/16 + 1/4, the edge rows
+ * A = 1 + cos theta + cos(theta/2) sqrt(18 + 2 cos theta), and the end rows with sum(w) = 0
+ * x = (sin theta (A + 4) - 2 cot(theta/2) (A + 2))/A. For m = 2 this is the B-spline's cross tangent. (Biermann, Levin, Zorin
+ * 2000 and OpenSubdiv have A = 4 for every m, which holds for their modified rules only.) From m = 4 on a further mode
+ * is as strong as the crease's own tangent: there is no tangent plane, and these two vectors are a choice.
+ * A dart (one
  * infinitely sharp spoke) has no closed form: its edge point is a midpoint, which changes the eigenvectors;
  * they are found by power iteration below (OpenSubdiv uses the smooth masks there). */
 #include "host/plan/local.h"
@@ -133,14 +138,16 @@ static void crease_masks(const qp_fan *fan, uint32_t begin, uint32_t faces, mask
     if (!m->has_tangents) return;
     m->t1[1 + begin] = 1.0;
     m->t1[1 + end] = -1.0;
-    double theta = pi / faces, r = (cos(theta) + 1.0) / sin(theta);
-    m->t2[0] = 4.0 * r * (cos(theta) - 1.0);
-    m->t2[1 + begin] = m->t2[1 + end] = -r * (1.0 + 2.0 * cos(theta));
+    double theta = pi / faces, a = 1.0 + cos(theta) + cos(0.5 * theta) * sqrt(18.0 + 2.0 * cos(theta));
+    double ends = (sin(theta) * (a + 4.0) - 2.0 / tan(0.5 * theta) * (a + 2.0)) / a, sum = 2.0 * ends;
+    m->t2[1 + begin] = m->t2[1 + end] = ends;
     for (uint32_t j = 0; j < faces; ++j) {
         uint32_t spoke = (begin + j) % spokes, face = (begin + j) % fan->faces;
-        if (j > 0) m->t2[1 + spoke] = 4.0 * sin(j * theta);
+        if (j > 0) m->t2[1 + spoke] = a * sin(j * theta);
         m->t2[1 + spokes + face] = sin(j * theta) + sin((j + 1) * theta);
+        sum += m->t2[1 + spokes + face] + (j > 0 ? m->t2[1 + spoke] : 0.0);
     }
+    m->t2[0] = -sum;
 }
 
 /* Masks of a fan without semi-sharp features. */

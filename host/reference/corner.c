@@ -5,7 +5,7 @@
  * sharp edges on either side of the face in question, or the whole fan. With k faces, spoke ends e_0 .. e_k
  * (e_k = e_0 in a fan) and opposite vertices f_0 .. f_(k-1), all relative to the vertex v:
  *   smooth   Halstead, Kass and DeRose 1993, appendix A
- *   crease   the curve's mask and the tangent across it of Biermann, Levin and Zorin 2000, appendix
+ *   crease   the curve's mask; across it the first sine mode of the sector (two or three faces)
  *   corner   v itself; a tangent plane exists only for one face between two creases
  *   dart     no closed form: the fixed matrix is iterated to convergence */
 #include "host/reference/corner.h"
@@ -154,15 +154,21 @@ static void crease_limit(const sector *s, qp_corner_limit *limit) {
         along[c] = (first[c] - last[c]) * 0.5 * s->scale;
     }
     /* One face: both its edges follow the same smooth curve, so its tangents there are parallel. A whole fan
-     * beside the crease (non-manifold) moves with a vertex that ignores it, as at a sharp apex. */
-    if (k == 1 || s->fan) return;
+     * beside the crease (non-manifold) moves with a vertex that ignores it, as at a sharp apex. Four faces and more:
+     * the sector's second sine mode has an eigenvalue of at least 1/2, the one of the crease's own tangent, so the
+     * directions near the vertex have no common plane. */
+    if (k == 1 || k >= 4 || s->fan) return;
+    /* The sector's first sine mode, of eigenvalue x/16 + 1/4 (OpenSubdiv has x = 4, right for two faces only). The
+     * crease's own ends follow from the rows of the end points and from weights that add up to 0. */
     long double theta = pi / k, cs = cosl(theta), sn = sinl(theta);
+    long double x = 1 + cs + cosl(theta / 2) * sqrtl(18 + 2 * cs);
     long double unit = s->scale / (k * (3 + cs));
+    long double ends = unit * (sn * (x + 4) - 2 * (x + 2) * cosl(theta / 2) / sinl(theta / 2)) / x;
     /* Normalised so that k = 2 gives the derivative across the edge. */
-    add(across, -unit * (cs + 1) / sn * (1 + 2 * cs), first);
-    add(across, -unit * (cs + 1) / sn * (1 + 2 * cs), last);
+    add(across, ends, first);
+    add(across, ends, last);
     for (uint32_t i = 0; i < k; ++i) {
-        if (i > 0) add(across, unit * 4 * sinl(i * theta), s->e + 3 * (size_t)i);
+        if (i > 0) add(across, unit * x * sinl(i * theta), s->e + 3 * (size_t)i);
         add(across, unit * (sinl(i * theta) + sinl((i + 1) * theta)), s->f + 3 * (size_t)i);
     }
     span_plane(s, along, across, theta, limit);
