@@ -48,9 +48,12 @@ run devices
 check "devices without OpenCL" [ "$code" -eq 0 ]
 unset OCL_ICD_VENDORS
 
-before=$(find "$work" | sort)
 refuses "folder missing" 3 "nowhere/x.obj: " gen cube -o "$work/nowhere/x.obj"
-refuses "disk full" 3 "/dev/full: " eval "$cube" --device host -o /dev/full
+ln -s /dev/full "$work/full.obj"
+refuses "disk full" 3 "full.obj: .*space" eval "$cube" --device host -o "$work/full.obj"
+"$QUADPLAN_PROGRAM" devices >/dev/full 2>"$work/stderr"
+check "standard output full: exit 3" [ $? -eq 3 ]
+check "standard output full: one line" one_line
 cp "$cube" "$work/kept.obj"
 before=$(find "$work" | sort)
 # A file size limit stands in for a disk that fills up half-way.
