@@ -84,6 +84,7 @@
     X(Uniform3f, UNIFORM3F)                                                                                  \
     X(Uniform3fv, UNIFORM3FV)                                                                                \
     X(Uniform4f, UNIFORM4F)                                                                                  \
+    X(Uniform4fv, UNIFORM4FV)                                                                                \
     X(UniformMatrix4fv, UNIFORMMATRIX4FV)                                                                    \
     X(UseProgram, USEPROGRAM)                                                                                \
     X(VertexAttribPointer, VERTEXATTRIBPOINTER)                                                              \

@@ -1,0 +1,343 @@
+#include "gl/draw.h"
+#include "gl/program.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { SHADOW_SIDE = 1024, BATCH = 1 << 17, SAMPLES = 4 };
+
+typedef struct drawing {
+    qp_gl *gl;
+    const qp_draw_input *in;
+    uint32_t lights, lamp_count;
+    bool shadowed;
+    qp_lamp *lamps;
+    GLuint shadow_program, surface_program, ground_program, background_program;
+    GLuint points_array, corners_array, empty_array;
+    GLuint points, indices, corners; /* buffers */
+    GLuint shadows;                  /* texture array, one layer a light */
+    GLuint shadow_target, target, resolved;
+    GLuint colour, depth, resolved_colour;
+} drawing;
+
+/* ---- Set-up ---- */
+
+static qp_status make_programs(drawing *d, qp_error *err) {
+    char defines[64];
+    snprintf(defines, sizeof defines, "#define LIGHTS %u\n", d->lights);
+    qp_gl_program_desc surface = {
+        .vertex = "surface.vert.glsl", .fragment = "surface.frag.glsl", .defines = defines};
+    qp_gl_program_desc background = {.vertex = "screen.vert.glsl", .fragment = "background.frag.glsl"};
+    qp_gl_program_desc shadow = {.vertex = "shadow.vert.glsl", .fragment = "shadow.frag.glsl"};
+    qp_status status = qp_gl_make_program(d->gl, &surface, &d->surface_program, err);
+    if (status == QP_OK) status = qp_gl_make_program(d->gl, &background, &d->background_program, err);
+    if (status == QP_OK) status = qp_gl_make_program(d->gl, &shadow, &d->shadow_program, err);
+    if (status != QP_OK || !d->in->scene->ground) return status;
+    snprintf(defines, sizeof defines, "#define LIGHTS %u\n#define GROUND\n", d->lights);
+    qp_gl_program_desc ground = {
+        .vertex = "ground.vert.glsl", .fragment = "surface.frag.glsl", .defines = defines};
+    return qp_gl_make_program(d->gl, &ground, &d->ground_program, err);
+}
+
+static void attribute(qp_gl *gl, GLuint index, GLint size, GLenum type, size_t stride, size_t offset) {
+    QP_GL(gl, EnableVertexAttribArray(index));
+    QP_GL(gl, VertexAttribPointer(index, size, type, type == GL_UNSIGNED_BYTE, (GLsizei)stride,
+                                  (const void *)(uintptr_t)offset));
+}
+
+static void make_buffers(drawing *d) {
+    qp_gl *gl = d->gl;
+    QP_GL(gl, GenVertexArrays(1, &d->points_array));
+    QP_GL(gl, GenVertexArrays(1, &d->corners_array));
+    QP_GL(gl, GenVertexArrays(1, &d->empty_array));
+    QP_GL(gl, GenBuffers(1, &d->points));
+    QP_GL(gl, GenBuffers(1, &d->indices));
+    QP_GL(gl, GenBuffers(1, &d->corners));
+    if (d->shadowed) {
+        QP_GL(gl, BindVertexArray(d->points_array));
+        QP_GL(gl, BindBuffer(GL_ARRAY_BUFFER, d->points));
+        QP_GL(gl, BufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(d->in->n_points * 3 * sizeof(float)),
+                             d->in->positions, GL_STATIC_DRAW));
+        attribute(gl, 0, 3, GL_FLOAT, 3 * sizeof(float), 0);
+        QP_GL(gl, BindBuffer(GL_ELEMENT_ARRAY_BUFFER, d->indices));
+        QP_GL(gl, BufferData(GL_ELEMENT_ARRAY_BUFFER, (GLsizeiptr)(d->in->n_triangles * 3 * sizeof(uint32_t)),
+                             d->in->triangles, GL_STATIC_DRAW));
+    }
+    QP_GL(gl, BindVertexArray(d->corners_array));
+    QP_GL(gl, BindBuffer(GL_ARRAY_BUFFER, d->corners));
+    attribute(gl, 0, 3, GL_FLOAT, sizeof(qp_corner), offsetof(qp_corner, position));
+    attribute(gl, 1, 3, GL_FLOAT, sizeof(qp_corner), offsetof(qp_corner, normal));
+    attribute(gl, 2, 2, GL_FLOAT, sizeof(qp_corner), offsetof(qp_corner, uv));
+    attribute(gl, 3, 3, GL_UNSIGNED_BYTE, sizeof(qp_corner), offsetof(qp_corner, colour));
+}
+
+static void make_renderbuffer(qp_gl *gl, GLuint *buffer, int samples, GLenum format, GLenum place, int width,
+                              int height) {
+    QP_GL(gl, GenRenderbuffers(1, buffer));
+    QP_GL(gl, BindRenderbuffer(GL_RENDERBUFFER, *buffer));
+    QP_GL(gl, RenderbufferStorageMultisample(GL_RENDERBUFFER, samples, format, width, height));
+    QP_GL(gl, FramebufferRenderbuffer(GL_FRAMEBUFFER, place, GL_RENDERBUFFER, *buffer));
+}
+
+static qp_status check_target(qp_gl *gl, qp_error *err) {
+    GLenum state = gl->CheckFramebufferStatus(GL_FRAMEBUFFER);
+    qp_gl_note(gl, "glCheckFramebufferStatus");
+    if (state != GL_FRAMEBUFFER_COMPLETE)
+        return qp_fail(err, QP_SYSTEM, "GL cannot draw into a picture of this size (status 0x%x, %s)", state,
+                       gl->backend);
+    return qp_gl_status(gl, err);
+}
+
+static qp_status make_targets(drawing *d, qp_error *err) {
+    qp_gl *gl = d->gl;
+    int width = (int)d->in->scene->width, height = (int)d->in->scene->height;
+    QP_GL(gl, GenFramebuffers(1, &d->target));
+    QP_GL(gl, BindFramebuffer(GL_FRAMEBUFFER, d->target));
+    make_renderbuffer(gl, &d->colour, SAMPLES, GL_RGBA16F, GL_COLOR_ATTACHMENT0, width, height);
+    make_renderbuffer(gl, &d->depth, SAMPLES, GL_DEPTH_COMPONENT32F, GL_DEPTH_ATTACHMENT, width, height);
+    qp_status status = check_target(gl, err);
+    if (status != QP_OK) return status;
+    QP_GL(gl, GenFramebuffers(1, &d->resolved));
+    QP_GL(gl, BindFramebuffer(GL_FRAMEBUFFER, d->resolved));
+    make_renderbuffer(gl, &d->resolved_colour, 0, GL_RGBA16F, GL_COLOR_ATTACHMENT0, width, height);
+    return check_target(gl, err);
+}
+
+/* ---- Passes ---- */
+
+static qp_status draw_shadows(drawing *d, qp_error *err) {
+    qp_gl *gl = d->gl;
+    QP_GL(gl, GenTextures(1, &d->shadows));
+    QP_GL(gl, ActiveTexture(GL_TEXTURE0));
+    QP_GL(gl, BindTexture(GL_TEXTURE_2D_ARRAY, d->shadows));
+    int side = d->shadowed ? SHADOW_SIDE : 1, layers = d->shadowed ? (int)d->lights : 1;
+    QP_GL(gl, TexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_DEPTH_COMPONENT16, side, side, layers, 0,
+                         GL_DEPTH_COMPONENT, GL_UNSIGNED_SHORT, NULL));
+    QP_GL(gl, TexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MIN_FILTER, GL_LINEAR));
+    QP_GL(gl, TexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAG_FILTER, GL_LINEAR));
+    QP_GL(gl, TexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE));
+    QP_GL(gl, TexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE));
+    QP_GL(gl, TexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_COMPARE_MODE, GL_COMPARE_REF_TO_TEXTURE));
+    QP_GL(gl, TexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_COMPARE_FUNC, GL_LEQUAL));
+    if (!d->shadowed) return qp_gl_status(gl, err);
+
+    QP_GL(gl, GenFramebuffers(1, &d->shadow_target));
+    QP_GL(gl, BindFramebuffer(GL_FRAMEBUFFER, d->shadow_target));
+    QP_GL(gl, DrawBuffer(GL_NONE));
+    QP_GL(gl, ReadBuffer(GL_NONE));
+    QP_GL(gl, Viewport(0, 0, SHADOW_SIDE, SHADOW_SIDE));
+    QP_GL(gl, Enable(GL_DEPTH_TEST));
+    QP_GL(gl, Enable(GL_POLYGON_OFFSET_FILL));
+    QP_GL(gl, PolygonOffset(2.0f, 4.0f));
+    QP_GL(gl, UseProgram(d->shadow_program));
+    QP_GL(gl, BindVertexArray(d->points_array));
+    GLint rows = gl->GetUniformLocation(d->shadow_program, "rows");
+    for (uint32_t k = 0; k < d->lights; k++) {
+        QP_GL(gl, FramebufferTextureLayer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, d->shadows, 0, (GLint)k));
+        if (k == 0) {
+            qp_status status = check_target(gl, err);
+            if (status != QP_OK) return status;
+        }
+        QP_GL(gl, Clear(GL_DEPTH_BUFFER_BIT));
+        QP_GL(gl, Uniform4fv(rows, 3, d->lamps[k].rows));
+        QP_GL(gl, DrawElements(GL_TRIANGLES, (GLsizei)(3 * d->in->n_triangles), GL_UNSIGNED_INT, NULL));
+    }
+    QP_GL(gl, Disable(GL_POLYGON_OFFSET_FILL));
+    return qp_gl_status(gl, err);
+}
+
+/* Uniforms that the compiler left out have location -1, which GL ignores. */
+static void set_float(qp_gl *gl, GLuint program, const char *name, double x) {
+    QP_GL(gl, Uniform1f(gl->GetUniformLocation(program, name), (float)x));
+}
+static void set_int(qp_gl *gl, GLuint program, const char *name, int x) {
+    QP_GL(gl, Uniform1i(gl->GetUniformLocation(program, name), x));
+}
+static void set_vector(qp_gl *gl, GLuint program, const char *name, const double x[3]) {
+    QP_GL(gl, Uniform3f(gl->GetUniformLocation(program, name), (float)x[0], (float)x[1], (float)x[2]));
+}
+static void set_scaled(qp_gl *gl, GLuint program, const char *name, const double x[3], double scale) {
+    const double scaled[3] = {x[0] * scale, x[1] * scale, x[2] * scale};
+    set_vector(gl, program, name, scaled);
+}
+
+static void set_light(drawing *d, GLuint program) {
+    qp_gl *gl = d->gl;
+    const qp_scene *s = d->in->scene;
+    const qp_view *view = d->in->view;
+    char name[40];
+    for (uint32_t k = 0; k < d->lights; k++) {
+        snprintf(name, sizeof name, "light_direction[%u]", k);
+        QP_GL(gl, Uniform3fv(gl->GetUniformLocation(program, name), 1, d->lamps[k].direction));
+        snprintf(name, sizeof name, "light_radiance[%u]", k);
+        QP_GL(gl, Uniform3fv(gl->GetUniformLocation(program, name), 1, d->lamps[k].radiance));
+        snprintf(name, sizeof name, "light_rows[%u]", 3 * k);
+        QP_GL(gl, Uniform4fv(gl->GetUniformLocation(program, name), 3, d->lamps[k].rows));
+    }
+    set_int(gl, program, "lamp_count", (int)d->lamp_count);
+    set_int(gl, program, "has_shadows", d->shadowed);
+    set_int(gl, program, "shadows", 0);
+    set_float(gl, program, "shadow_offset", 3.0 * view->radius / SHADOW_SIDE);
+    set_vector(gl, program, "up", view->world_up);
+    set_vector(gl, program, "eye", view->eye);
+    set_scaled(gl, program, "sky_zenith", s->sky_zenith, s->sky_intensity);
+    set_scaled(gl, program, "sky_horizon", s->sky_horizon, s->sky_intensity);
+    set_scaled(gl, program, "sky_ground", s->sky_ground, s->sky_intensity);
+    set_float(gl, program, "exposure", s->exposure);
+}
+
+static void set_background(drawing *d, GLuint program) {
+    const qp_scene *s = d->in->scene;
+    set_vector(d->gl, program, "background_top", s->background_top);
+    set_vector(d->gl, program, "background_bottom", s->background_bottom);
+    set_float(d->gl, program, "background_alpha", s->background_alpha);
+    set_float(d->gl, program, "height", s->height);
+}
+
+static void draw_background(drawing *d) {
+    qp_gl *gl = d->gl;
+    QP_GL(gl, Disable(GL_DEPTH_TEST));
+    QP_GL(gl, UseProgram(d->background_program));
+    set_background(d, d->background_program);
+    QP_GL(gl, BindVertexArray(d->empty_array));
+    QP_GL(gl, DrawArrays(GL_TRIANGLES, 0, 3));
+    QP_GL(gl, Enable(GL_DEPTH_TEST));
+}
+
+/* Under the lowest point, a little below it so that the two do not fight. */
+static void draw_ground(drawing *d) {
+    qp_gl *gl = d->gl;
+    const qp_view *view = d->in->view;
+    double centre[3], u[3], v[3], side = 10 * view->radius, lift = view->floor - 2e-3 * view->radius;
+    for (int k = 0; k < 3; k++) lift -= view->world_up[k] * view->centre[k];
+    const double *up = view->world_up;
+    int least = fabs(up[0]) <= fabs(up[1]) && fabs(up[0]) <= fabs(up[2]) ? 0
+                : fabs(up[1]) <= fabs(up[2])                             ? 1
+                                                                         : 2;
+    double axis[3] = {0, 0, 0}, along = up[least] * side;
+    axis[least] = side;
+    for (int k = 0; k < 3; k++) {
+        centre[k] = view->centre[k] + lift * up[k];
+        u[k] = axis[k] - along * up[k];
+    }
+    for (int k = 0; k < 3; k++) v[k] = up[(k + 1) % 3] * u[(k + 2) % 3] - up[(k + 2) % 3] * u[(k + 1) % 3];
+    QP_GL(gl, UseProgram(d->ground_program));
+    set_light(d, d->ground_program);
+    set_background(d, d->ground_program);
+    QP_GL(gl, UniformMatrix4fv(gl->GetUniformLocation(d->ground_program, "view_projection"), 1, GL_FALSE,
+                               view->view_projection));
+    set_vector(gl, d->ground_program, "ground_centre", centre);
+    set_vector(gl, d->ground_program, "ground_u", u);
+    set_vector(gl, d->ground_program, "ground_v", v);
+    set_vector(gl, d->ground_program, "ground_colour", d->in->scene->ground_colour);
+    set_float(gl, d->ground_program, "ground_fade", 6 * view->radius);
+    QP_GL(gl, BindVertexArray(d->empty_array));
+    QP_GL(gl, DrawArrays(GL_TRIANGLE_STRIP, 0, 4));
+}
+
+static qp_status draw_surface(drawing *d, qp_error *err) {
+    qp_gl *gl = d->gl;
+    const qp_scene *s = d->in->scene;
+    GLuint program = d->surface_program;
+    QP_GL(gl, UseProgram(program));
+    set_light(d, program);
+    QP_GL(gl, UniformMatrix4fv(gl->GetUniformLocation(program, "view_projection"), 1, GL_FALSE,
+                               d->in->view->view_projection));
+    bool material = s->colour_by == QP_COLOUR_MATERIAL;
+    set_vector(gl, program, "back_colour", s->back_colour);
+    set_int(gl, program, "use_back_colour", material);
+    set_int(gl, program, "show_normals", s->colour_by == QP_COLOUR_NORMAL);
+    set_float(gl, program, "gloss", material ? s->gloss : 0.3);
+    set_float(gl, program, "specular", material ? s->specular : 0.3);
+    set_float(gl, program, "wire_width", s->wire_width);
+    set_vector(gl, program, "wire_colour", s->wire_colour);
+    set_float(gl, program, "border_width", material || s->colour_by == QP_COLOUR_NORMAL ? 0 : 1.6);
+    QP_GL(gl, BindVertexArray(d->corners_array));
+    QP_GL(gl, BindBuffer(GL_ARRAY_BUFFER, d->corners));
+    qp_corner *corners = qp_alloc(3 * BATCH, sizeof *corners, false);
+    if (corners == NULL) return qp_fail_memory(err, 3 * BATCH * sizeof *corners, "triangles to draw");
+    for (uint64_t first = 0; first < d->in->n_triangles; first += BATCH) {
+        uint64_t left = d->in->n_triangles - first, count = left < BATCH ? left : BATCH;
+        d->in->fill(d->in->context, first, count, corners);
+        QP_GL(gl, BufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(3 * count * sizeof *corners), corners,
+                             GL_STREAM_DRAW));
+        QP_GL(gl, DrawArrays(GL_TRIANGLES, 0, (GLsizei)(3 * count)));
+    }
+    free(corners);
+    return qp_gl_status(gl, err);
+}
+
+static qp_status read_back(drawing *d, float *pixels, qp_error *err) {
+    qp_gl *gl = d->gl;
+    int width = (int)d->in->scene->width, height = (int)d->in->scene->height;
+    QP_GL(gl, BindFramebuffer(GL_READ_FRAMEBUFFER, d->target));
+    QP_GL(gl, BindFramebuffer(GL_DRAW_FRAMEBUFFER, d->resolved));
+    QP_GL(gl, BlitFramebuffer(0, 0, width, height, 0, 0, width, height, GL_COLOR_BUFFER_BIT, GL_NEAREST));
+    QP_GL(gl, BindFramebuffer(GL_FRAMEBUFFER, d->resolved));
+    QP_GL(gl, PixelStorei(GL_PACK_ALIGNMENT, 4));
+    /* GL counts rows from the bottom. */
+    for (int y = 0; y < height; y++)
+        QP_GL(gl, ReadPixels(0, height - 1 - y, width, 1, GL_RGBA, GL_FLOAT,
+                             pixels + (size_t)y * (size_t)width * 4));
+    return qp_gl_status(gl, err);
+}
+
+static void free_drawing(drawing *d) {
+    qp_gl *gl = d->gl;
+    const GLuint programs[] = {d->shadow_program, d->surface_program, d->ground_program,
+                               d->background_program};
+    for (size_t k = 0; k < sizeof programs / sizeof programs[0]; k++)
+        if (programs[k] != 0) QP_GL(gl, DeleteProgram(programs[k]));
+    const GLuint arrays[] = {d->points_array, d->corners_array, d->empty_array};
+    const GLuint buffers[] = {d->points, d->indices, d->corners};
+    const GLuint targets[] = {d->shadow_target, d->target, d->resolved};
+    const GLuint renderbuffers[] = {d->colour, d->depth, d->resolved_colour};
+    QP_GL(gl, DeleteVertexArrays(3, arrays)); /* 0 is ignored in all of these */
+    QP_GL(gl, DeleteBuffers(3, buffers));
+    QP_GL(gl, DeleteFramebuffers(3, targets));
+    QP_GL(gl, DeleteRenderbuffers(3, renderbuffers));
+    QP_GL(gl, DeleteTextures(1, &d->shadows));
+    free(d->lamps);
+}
+
+/* Shadows of very many triangles from fewer directions, so that the time stays within bounds. */
+static void choose_lights(drawing *d) {
+    const uint64_t budget = 100u << 20;
+    uint32_t wish = d->in->scene->shadow_samples;
+    d->shadowed = wish > 0;
+    d->lights = wish > 0 ? wish : 32;
+    if (d->shadowed && d->lights * d->in->n_triangles > budget)
+        d->lights = (uint32_t)(budget / d->in->n_triangles);
+    if (d->lights < 16) d->lights = 16;
+}
+
+qp_status qp_gl_draw(qp_gl *gl, const qp_draw_input *input, float *pixels, qp_error *err) {
+    drawing d = {.gl = gl, .in = input};
+    if (input->n_triangles > INT32_MAX / 3)
+        return qp_fail(err, QP_BAD_INPUT, "too many triangles to draw (%llu)",
+                       (unsigned long long)input->n_triangles);
+    choose_lights(&d);
+    d.lamps = qp_alloc(d.lights, sizeof *d.lamps, true);
+    if (d.lamps == NULL) return qp_fail_memory(err, d.lights * sizeof *d.lamps, "lights");
+    qp_view_lamps(input->scene, input->view, d.lights, d.lamps, &d.lamp_count);
+    qp_status status = make_programs(&d, err);
+    if (status == QP_OK) {
+        make_buffers(&d);
+        status = draw_shadows(&d, err);
+    }
+    if (status == QP_OK) status = make_targets(&d, err);
+    if (status == QP_OK) {
+        QP_GL(gl, BindFramebuffer(GL_FRAMEBUFFER, d.target));
+        QP_GL(gl, Viewport(0, 0, (GLsizei)input->scene->width, (GLsizei)input->scene->height));
+        QP_GL(gl, Clear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT));
+        draw_background(&d);
+        if (input->scene->ground) draw_ground(&d);
+        status = draw_surface(&d, err);
+    }
+    if (status == QP_OK) status = read_back(&d, pixels, err);
+    free_drawing(&d);
+    return status;
+}
