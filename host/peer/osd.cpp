@@ -1,8 +1,10 @@
 #include "host/peer/osd.h"
 
+#include <cmath>
 #include <cstring>
 #include <exception>
 #include <memory>
+#include <new>
 #include <string>
 #include <vector>
 
@@ -101,6 +103,71 @@ std::unique_ptr<Far::TopologyRefiner> make_refiner(const qp_mesh *mesh) {
         Factory::Create(d, Factory::Options(Sdc::SCHEME_CATMARK, scheme_options(mesh))));
 }
 
+/* Refined positions, level after level, from those of the base mesh; points has room for all. */
+void interpolate(const Far::TopologyRefiner &refiner, const double *positions, std::vector<Point> &points) {
+    for (size_t v = 0; v < (size_t)refiner.GetLevel(0).GetNumVertices(); ++v)
+        std::memcpy(points[v].p, positions + 3 * v, sizeof points[v].p);
+    Far::PrimvarRefinerReal<double> primvar(refiner);
+    Point *from = points.data();
+    for (int level = 1; level <= refiner.GetMaxLevel(); ++level) {
+        Point *to = from + refiner.GetLevel(level - 1).GetNumVertices();
+        primvar.Interpolate(level, from, to);
+        from = to;
+    }
+}
+
+/* The square of a patch that a refined face covers. */
+struct Place {
+    uint32_t patch;
+    double u, v, size;
+};
+
+/* Places of a level's faces from those of its parents. A quad's children keep its orientation; children of
+ * other faces start at their corner. */
+std::vector<Place> child_places(const Far::TopologyLevel &parent, const Far::TopologyLevel &child,
+                                const std::vector<Place> &places) {
+    static const double offset[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+    std::vector<Place> result((size_t)child.GetNumFaces());
+    for (int f = 0; f < parent.GetNumFaces(); ++f) {
+        Far::ConstIndexArray children = parent.GetFaceChildFaces(f);
+        const Place &at = places[(size_t)f];
+        for (int j = 0; j < children.size(); ++j) {
+            Place &to = result[(size_t)children[j]];
+            if (children.size() != 4) {
+                to = {at.patch + (uint32_t)j, 0, 0, 1};
+            } else {
+                double half = at.size / 2;
+                to = {at.patch, at.u + half * offset[j][0], at.v + half * offset[j][1], half};
+            }
+        }
+    }
+    return result;
+}
+
+/* What qp_osd_limit says about the rule at a vertex. */
+void classify(const Far::TopologyLevel &level, int vertex, qp_osd_limit *limit) {
+    Far::ConstIndexArray edges = level.GetVertexEdges(vertex);
+    int faces = level.GetVertexFaces(vertex).size();
+    auto semisharp = [](float s) { return s > 0 && s < QP_SHARPNESS_INFINITE; };
+    Sdc::Crease::Rule rule = level.GetVertexRule(vertex);
+    limit->settled = !semisharp(level.GetVertexSharpness(vertex)) && rule != Sdc::Crease::RULE_DART;
+    for (int i = 0; i < edges.size(); ++i)
+        limit->settled = limit->settled && !semisharp(level.GetEdgeSharpness(edges[i]));
+    bool smooth = rule == Sdc::Crease::RULE_SMOOTH;
+    bool boundary = faces + 1 == edges.size() && !level.IsVertexNonManifold(vertex);
+    if (smooth && faces == 2) limit->settled = false;
+    limit->has_normal =
+        limit->settled && (smooth || (boundary && rule == Sdc::Crease::RULE_CREASE && faces == 2));
+}
+
+bool unit_normal(const Point &a, const Point &b, double n[3]) {
+    for (int c = 0; c < 3; ++c)
+        n[c] = a.p[(c + 1) % 3] * b.p[(c + 2) % 3] - a.p[(c + 2) % 3] * b.p[(c + 1) % 3];
+    double length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    for (int c = 0; c < 3; ++c) n[c] = length > 0 ? n[c] / length : 0;
+    return length > 0;
+}
+
 } // namespace
 
 struct qp_osd {
@@ -110,6 +177,45 @@ struct qp_osd {
 };
 
 namespace {
+
+qp_status uniform_limits(const qp_mesh *mesh, const double *positions, unsigned level,
+                         std::vector<qp_osd_limit> &limits, qp_error *err) {
+    std::unique_ptr<Far::TopologyRefiner> refiner = make_refiner(mesh);
+    if (!refiner) return refused(err);
+    Far::TopologyRefiner::UniformOptions options(level);
+    options.fullTopologyInLastLevel = true;
+    refiner->RefineUniform(options);
+    std::vector<Point> points((size_t)refiner->GetNumVerticesTotal());
+    interpolate(*refiner, positions, points);
+
+    std::vector<Place> places(mesh->n_faces);
+    for (uint32_t f = 0; f < mesh->n_faces; ++f) places[f] = {mesh->patch_offsets[f], 0, 0, 1};
+    for (int l = 1; l <= (int)level; ++l)
+        places = child_places(refiner->GetLevel(l - 1), refiner->GetLevel(l), places);
+
+    const Far::TopologyLevel &last = refiner->GetLevel((int)level);
+    size_t n = (size_t)last.GetNumVertices();
+    std::vector<Point> at(n), t1(n), t2(n);
+    Point *from = points.data() + (points.size() - n), *p = at.data(), *a = t1.data(), *b = t2.data();
+    Far::PrimvarRefinerReal<double>(*refiner).Limit(from, p, a, b);
+    static const double offset[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+    for (int f = 0; f < last.GetNumFaces(); ++f) {
+        const Place &place = places[(size_t)f];
+        Far::ConstIndexArray vertices = last.GetFaceVertices(f);
+        for (int j = 0; j < 4 && !last.IsFaceHole(f); ++j) {
+            size_t v = (size_t)vertices[j];
+            qp_osd_limit limit = {};
+            limit.patch = place.patch;
+            limit.u = place.u + place.size * offset[j][0];
+            limit.v = place.v + place.size * offset[j][1];
+            std::memcpy(limit.p, at[v].p, sizeof limit.p);
+            classify(last, vertices[j], &limit);
+            limit.has_normal = unit_normal(t1[v], t2[v], limit.n) && limit.has_normal;
+            limits.push_back(limit);
+        }
+    }
+    return QP_OK;
+}
 
 qp_status fill(qp_osd *osd, const qp_mesh *mesh, const double *positions, unsigned depth, qp_error *err) {
     std::unique_ptr<Far::TopologyRefiner> refiner = make_refiner(mesh);
@@ -128,15 +234,7 @@ qp_status fill(qp_osd *osd, const qp_mesh *mesh, const double *positions, unsign
 
     size_t refined = (size_t)refiner->GetNumVerticesTotal();
     osd->points.resize(refined + (size_t)osd->table->GetNumLocalPoints());
-    for (size_t v = 0; v < mesh->n_vertices; ++v)
-        std::memcpy(osd->points[v].p, positions + 3 * v, sizeof osd->points[v].p);
-    Far::PrimvarRefinerReal<double> primvar(*refiner);
-    Point *from = osd->points.data();
-    for (int level = 1; level <= refiner->GetMaxLevel(); ++level) {
-        Point *to = from + refiner->GetLevel(level - 1).GetNumVertices();
-        primvar.Interpolate(level, from, to);
-        from = to;
-    }
+    interpolate(*refiner, positions, osd->points);
     if (osd->table->GetNumLocalPoints() > 0)
         osd->table->GetLocalPointStencilTable<double>()->UpdateValues(osd->points.data(),
                                                                       osd->points.data() + refined);
@@ -188,6 +286,24 @@ extern "C" qp_status qp_osd_eval(const qp_osd *osd, uint32_t patch, size_t count
                                  qp_osd_sample *samples, qp_error *err) {
     return guarded(err, [&]() {
         for (size_t i = 0; i < count; ++i) evaluate(osd, patch, uv[2 * i], uv[2 * i + 1], &samples[i]);
+        return QP_OK;
+    });
+}
+
+extern "C" qp_status qp_osd_uniform_limits(const qp_mesh *mesh, const double *positions, unsigned level,
+                                           qp_osd_limit **limits, size_t *count, qp_error *err) {
+    *limits = nullptr;
+    *count = 0;
+    if (level < 1 || level > 8)
+        return qp_fail(err, QP_BAD_INPUT, "uniform refinement is to levels 1 to 8, not %u", level);
+    return guarded(err, [&]() {
+        std::vector<qp_osd_limit> made;
+        qp_status status = uniform_limits(mesh, positions, level, made, err);
+        if (status != QP_OK) return status;
+        *limits = static_cast<qp_osd_limit *>(qp_alloc(made.size(), sizeof(qp_osd_limit), false));
+        if (!*limits) return qp_fail_memory(err, made.size() * sizeof(qp_osd_limit), "limits");
+        if (!made.empty()) std::memcpy(*limits, made.data(), made.size() * sizeof(qp_osd_limit));
+        *count = made.size();
         return QP_OK;
     });
 }

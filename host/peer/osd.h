@@ -29,6 +29,24 @@ void qp_osd_free(qp_osd *osd);
 qp_status qp_osd_eval(const qp_osd *osd, uint32_t patch, size_t count, const double *uv,
                       qp_osd_sample *samples, qp_error *err);
 
+typedef struct qp_osd_limit {
+    uint32_t patch;
+    double u, v;
+    double p[3], n[3]; /* n: unit, where has_normal */
+    /* The rule at the vertex no longer changes, so that its limit mask is right. False at darts (OpenSubdiv
+     * takes the smooth mask there) and at interior vertices of valence 2 (it takes the vertex itself). */
+    bool settled;
+    /* Settled, and smooth or on a boundary of two faces. (On wider ones its tangent across the boundary is
+     * that of another rule, see docs/reference.md.) */
+    bool has_normal;
+} qp_osd_limit;
+
+/* Limits by masks at all face corners of a uniform refinement to `level` (1..8), in double; a vertex appears
+ * once for each of its faces. Unlike adaptive refinement this knows every neighbour at every level. The
+ * caller frees *limits with free(). */
+qp_status qp_osd_uniform_limits(const qp_mesh *mesh, const double *positions, unsigned level,
+                                qp_osd_limit **limits, size_t *count, qp_error *err);
+
 /* Milliseconds of adaptive refinement to `level`, of the patch table with B-spline end caps, and of the
  * stencil table of all points, in float, as a program would set it up; topology only. One run. */
 qp_status qp_osd_time_setup(const qp_mesh *mesh, unsigned level, double *refine_ms, double *patch_ms,

@@ -145,6 +145,14 @@ static void smooth_limit(const sector *s, qp_corner_limit *limit) {
     if (n > 2) span_plane(s, a, b, theta, limit);
 }
 
+/* The left eigenvector across a crease of k faces, for the eigenvalue l at angle theta = pi / k. Within the
+ * sector it is the smooth one's sine: 4 sin(i theta) at e_i, (sin(i theta) + sin((i+1) theta)) / (4 l - 1) at
+ * f_i. With S = sum of sin(i theta) = cot(theta / 2), the columns of e_0 and of v leave, for the weights c of
+ * the crease's ends and w of v,
+ *   (l - 1/2) c - w / 8 = l sin(theta) / (4 l - 1)       (l - 3/4) w - c = S (1 + 2 l / (4 l - 1)),
+ * hence (l - 1)(l - 1/4) w = l sin(theta) / (4 l - 1) + (l - 1/2) S (1 + 2 l / (4 l - 1)).
+ * The mask of Biermann, Levin and Zorin 2000, which OpenSubdiv takes, has l = 1/2 here: it belongs to their
+ * modified edge rule and is off for k > 2 under the plain one. */
 static void crease_limit(const sector *s, qp_corner_limit *limit) {
     uint32_t k = s->k;
     const qp_quad *first = s->e, *last = s->e + 3 * (size_t)k;
@@ -154,22 +162,18 @@ static void crease_limit(const sector *s, qp_corner_limit *limit) {
         along[c] = (first[c] - last[c]) * 0.5 * s->scale;
     }
     /* One face: both its edges follow the same smooth curve, so its tangents there are parallel. A whole fan
-     * beside the crease (non-manifold) moves with a vertex that ignores it, as at a sharp apex. Four faces and more:
-     * the sector's second sine mode has an eigenvalue of at least 1/2, the one of the crease's own tangent, so the
-     * directions near the vertex have no common plane. */
-    if (k == 1 || k >= 4 || s->fan) return;
-    /* The sector's first sine mode, of eigenvalue x/16 + 1/4 (OpenSubdiv has x = 4, right for two faces only). The
-     * crease's own ends follow from the rows of the end points and from weights that add up to 0. */
-    long double theta = pi / k, cs = cosl(theta), sn = sinl(theta);
-    long double x = 1 + cs + cosl(theta / 2) * sqrtl(18 + 2 * cs);
-    long double unit = s->scale / (k * (3 + cs));
-    long double ends = unit * (sn * (x + 4) - 2 * (x + 2) * cosl(theta / 2) / sinl(theta / 2)) / x;
-    /* Normalised so that k = 2 gives the derivative across the edge. */
-    add(across, ends, first);
-    add(across, ends, last);
+     * beside the crease (non-manifold) moves with a vertex that ignores it, as at a sharp apex. */
+    if (k == 1 || s->fan) return;
+    long double theta = pi / k, l = eigenvalue(theta), face = 1 / (4 * l - 1);
+    long double unit = s->scale / (k * (3 + cosl(theta))); /* k = 2: the derivative across the edge */
+    long double total = (1 + 2 * l * face) / tanl(theta / 2);
+    long double w = (l * face * sinl(theta) + (l - 0.5L) * total) / ((l - 1) * (l - 0.25L));
+    long double end = (l - 0.75L) * w - total;
+    add(across, unit * end, first);
+    add(across, unit * end, last);
     for (uint32_t i = 0; i < k; ++i) {
-        if (i > 0) add(across, unit * x * sinl(i * theta), s->e + 3 * (size_t)i);
-        add(across, unit * (sinl(i * theta) + sinl((i + 1) * theta)), s->f + 3 * (size_t)i);
+        if (i > 0) add(across, unit * 4 * sinl(i * theta), s->e + 3 * (size_t)i);
+        add(across, unit * face * (sinl(i * theta) + sinl((i + 1) * theta)), s->f + 3 * (size_t)i);
     }
     span_plane(s, along, across, theta, limit);
 }
