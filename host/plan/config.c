@@ -100,7 +100,7 @@ static float far_sharpness(const qp_mesh *mesh, uint32_t vertex, uint32_t edge) 
     }
     if (!qp_sharp_is_semi(own)) return own;
     float child = own;
-    if (count > 1) child = 0.75f * own + 0.25f * ((float)((sum - (double)own) / (double)(count - 1)));
+    if (count > 1) child = 0.75f * own + 0.25f * (((float)sum - own) / (float)(count - 1));
     child -= 1.0f;
     return child > 0.0f ? child : 0.0f;
 }
@@ -356,7 +356,8 @@ static bool fill_fan(qp_gather *g, const qp_mesh *mesh, uint32_t i, uint32_t fir
     for (uint32_t j = 0; j < spokes; ++j) {
         uint32_t far;
         fan->sharp[j] = mesh->edge_sharpness[spoke_edge(g, mesh, i, j, &far)];
-        fan->far_sharp[j] = local->chaikin ? spoke_far_sharpness(g, mesh, i, j) : 0.0f;
+        fan->far_sharp[j] =
+            local->chaikin ? spoke_far_sharpness(g, mesh, i, j) : qp_sharp_decrement(fan->sharp[j]);
     }
     return true;
 }

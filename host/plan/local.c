@@ -140,7 +140,7 @@ bool qp_sharp_is_semi(float s) {
     return s > 0.0f && s < QP_SHARPNESS_INFINITE;
 }
 
-static float decrement(float s) {
+float qp_sharp_decrement(float s) {
     if (qp_sharp_is_infinite(s)) return QP_SHARPNESS_INFINITE;
     return s > 1.0f ? s - 1.0f : 0.0f;
 }
@@ -149,8 +149,8 @@ static float decrement(float s) {
  * double, so that the sum does not depend on where the walk around the vertex began). */
 static float chaikin(float s, double sum, uint32_t count) {
     if (!qp_sharp_is_semi(s)) return s;
-    if (count < 2) return decrement(s);
-    float others = (float)((sum - (double)s) / (double)(count - 1));
+    if (count < 2) return qp_sharp_decrement(s);
+    float others = ((float)sum - s) / (float)(count - 1);
     float child = (0.75f * s + 0.25f * others) - 1.0f;
     return child > 0.0f ? child : 0.0f;
 }
@@ -167,7 +167,7 @@ static void child_sharpness(const qp_local *local, const float *sharp, uint32_t 
         }
     }
     for (uint32_t j = 0; j < spokes; ++j) {
-        child[j] = local->chaikin ? chaikin(sharp[j], sum, count) : decrement(sharp[j]);
+        child[j] = local->chaikin ? chaikin(sharp[j], sum, count) : qp_sharp_decrement(sharp[j]);
     }
 }
 
@@ -224,13 +224,14 @@ static uint32_t face_size(const qp_local *local, const qp_fan *fan, uint32_t j) 
     return fan->face != NULL ? local->ring_faces[fan->face[j]].size : 4;
 }
 
-/* Share of the crease rule in an edge point (the rest is the smooth rule). */
+/* Share of the crease rule in an edge point (the rest is the smooth rule): a full crease while both halves stay sharp, else the
+ * sharpness itself. Under Chaikin's rule that may exceed 1 (a sharp edge beside blunt ones can lose more than 1) and
+ * extrapolates; OpenSubdiv's Far does so, and it defines the surface. */
 static double edge_crease_share(const qp_local *local, float sharp, float near_child, float far_child) {
     if (sharp <= 0.0f) return 0.0;
-    if (sharp >= 1.0f) return 1.0;
-    /* Chaikin: an edge whose halves both stay sharp is a full crease still. */
-    if (local->chaikin && near_child > 0.0f && far_child > 0.0f) return 1.0;
-    return (double)sharp;
+    if (qp_sharp_is_infinite(sharp)) return 1.0;
+    if (!local->chaikin) return sharp >= 1.0f ? 1.0 : (double)sharp;
+    return near_child > 0.0f && far_child > 0.0f ? 1.0 : (double)sharp;
 }
 
 static uint32_t refine_edge(qp_local *local, const qp_level *from, qp_level *to, const qp_fan *fan,
@@ -245,7 +246,7 @@ static uint32_t refine_edge(qp_local *local, const qp_level *from, qp_level *to,
     uint32_t right = j == 0 ? (fan->closed ? fan->faces - 1 : QP_NONE) : j - 1;
     uint32_t left = j < fan->faces ? j : QP_NONE;
     double face_weight = 0.0;
-    if (right != QP_NONE && left != QP_NONE && share < 1.0) {
+    if (right != QP_NONE && left != QP_NONE && share != 1.0) {
         face_weight = 0.25;
         if (local->smooth_triangles && fan->face != NULL) {
             /* OpenSubdiv's "smooth" triangle rule: 0.470 for a triangle, averaged over the edge's two faces.
@@ -262,7 +263,7 @@ static uint32_t refine_edge(qp_local *local, const qp_level *from, qp_level *to,
     row_zero(row, local->width);
     row_add(row, qp_level_row(local, from, a), vertex_weight, local->width);
     row_add(row, qp_level_row(local, from, b), vertex_weight, local->width);
-    if (share < 1.0) {
+    if (share != 1.0) {
         face_weight *= 1.0 - share;
         row_add(row, qp_level_row(local, to, refined->face[right]), face_weight, local->width);
         row_add(row, qp_level_row(local, to, refined->face[left]), face_weight, local->width);
@@ -334,7 +335,7 @@ static uint32_t refine_vertex(qp_local *local, const qp_level *from, qp_level *t
     uint32_t point = qp_level_point(local, to, QP_KEY_VERTEX, fan->vertex, fan->vertex, &fresh);
     if (!fresh || local->failed) return point;
     uint32_t spokes = qp_fan_spokes(fan), parent_ends[2], child_ends[2];
-    float child_sharp = decrement(fan->sharpness);
+    float child_sharp = qp_sharp_decrement(fan->sharpness);
     vertex_rule parent = rule_of(fan->sharpness, fan->sharp, spokes, parent_ends);
     vertex_rule child = rule_of(child_sharp, refined->sharp, spokes, child_ends);
     double *row = qp_level_row(local, to, point);
@@ -393,7 +394,7 @@ static qp_fan *vertex_fan(qp_local *local, qp_level *to, const qp_fan *fan, cons
     }
     uint32_t spokes = qp_fan_spokes(fan);
     child->vertex = refined->vertex;
-    child->sharpness = decrement(fan->sharpness);
+    child->sharpness = qp_sharp_decrement(fan->sharpness);
     memcpy(child->spoke, refined->edge, spokes * sizeof *child->spoke);
     memcpy(child->diagonal, refined->face, fan->faces * sizeof *child->diagonal);
     memcpy(child->sharp, refined->sharp, spokes * sizeof *child->sharp);
@@ -403,7 +404,7 @@ static qp_fan *vertex_fan(qp_local *local, qp_level *to, const qp_fan *fan, cons
         uint32_t count = (qp_sharp_is_semi(near) ? 1u : 0u) + (qp_sharp_is_semi(far) ? 1u : 0u);
         double sum =
             (qp_sharp_is_semi(near) ? (double)near : 0.0) + (qp_sharp_is_semi(far) ? (double)far : 0.0);
-        child->far_sharp[j] = local->chaikin ? chaikin(near, sum, count) : decrement(near);
+        child->far_sharp[j] = local->chaikin ? chaikin(near, sum, count) : qp_sharp_decrement(near);
     }
     return child;
 }

@@ -21,7 +21,7 @@ typedef struct qp_fan {
     bool closed;
     uint32_t *spoke;  /* [spokes] far points */
     float *sharp;     /* [spokes] sharpness of the spoke edges */
-    float *far_sharp; /* [spokes] Chaikin: sharpness that the far half of the spoke gets at the next level */
+    float *far_sharp; /* [spokes] sharpness that the far half of the spoke gets at the next level */
     uint32_t *diagonal; /* [m] the fourth point of quad j; QP_NONE where the face is no quad (level 0 only) */
     uint32_t *face;     /* [m] index into qp_local.faces at level 0; NULL above */
 } qp_fan;
@@ -120,8 +120,9 @@ qp_fan *qp_refine_fan(qp_local *local, qp_level *from, qp_level *to, const qp_fa
 void qp_limit_stencils(qp_local *local, const qp_level *from, const qp_corner *corner, double *rows,
                        bool *has_tangents);
 
-/* Shared with limit.c */
 bool qp_sharp_is_semi(float s);
 bool qp_sharp_is_infinite(float s);
+/* After one subdivision, by the uniform rule. */
+float qp_sharp_decrement(float s);
 
 #endif

@@ -56,7 +56,9 @@ static bool crease_goes_on(const qp_corner *c, int step, float s) {
     const qp_fan *fan = c->fan;
     if (!fan->closed || fan->faces != 4 || fan->sharpness > 0.0f) return false;
     uint32_t infinite;
-    return sharp_spokes(fan, &infinite) == 2 && qp_corner_sharp(c, step) == s &&
+    /* Chaikin: its far half must decay as the near one does, or the crease is not constant. */
+    bool constant = fan->far_sharp[qp_corner_spoke(c, step + 2)] == qp_sharp_decrement(s);
+    return constant && sharp_spokes(fan, &infinite) == 2 && qp_corner_sharp(c, step) == s &&
            qp_corner_sharp(c, step + 2) == s && is_quad(c, 0) && is_quad(c, 1) && is_quad(c, 2) &&
            is_quad(c, 3);
 }
