@@ -177,6 +177,7 @@ static void set_light(drawing *d, GLuint program) {
         snprintf(name, sizeof name, "light_rows[%u]", 3 * k);
         QP_GL(gl, Uniform4fv(gl->GetUniformLocation(program, name), 3, d->lamps[k].rows));
     }
+    set_int(gl, program, "light_count", (int)d->lights);
     set_int(gl, program, "lamp_count", (int)d->lamp_count);
     set_int(gl, program, "has_shadows", d->shadowed);
     set_int(gl, program, "shadows", 0);

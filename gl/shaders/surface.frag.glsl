@@ -5,7 +5,8 @@ uniform vec3 eye;
 uniform vec3 light_direction[LIGHTS];
 uniform vec3 light_radiance[LIGHTS];
 uniform vec4 light_rows[3 * LIGHTS];
-uniform int lamp_count;  // the first ones are lamps (they glint), the others are sky
+uniform int light_count;  // LIGHTS, but unknown to the compiler, which would unroll the loops
+uniform int lamp_count;   // the first ones are lamps (they glint), the others are sky
 uniform int has_shadows;
 uniform sampler2DArrayShadow shadows;
 uniform float shadow_offset;
@@ -38,7 +39,7 @@ uniform float height;
 
 void main() {
     vec3 lit = vec3(0.0), open = vec3(0.0);
-    for (int k = 0; k < LIGHTS; k++) {
+    for (int k = 0; k < light_count; k++) {
         vec3 e = light_radiance[k] * max(dot(up, light_direction[k]), 0.0);
         open += e;
         lit += e * visibility(k, at + shadow_offset * up);
@@ -78,7 +79,7 @@ vec3 shade(vec3 n, vec3 v, vec3 albedo) {
     float f0 = 0.08 * specular;
     vec3 diffuse = vec3(0.0), shine = vec3(0.0), seen = vec3(0.0), sky = vec3(1e-6);
     vec3 p = at + shadow_offset * n;
-    for (int k = 0; k < LIGHTS; k++) {
+    for (int k = 0; k < light_count; k++) {
         vec3 l = light_direction[k];
         float nl = dot(n, l);
         if (k >= lamp_count) sky += light_radiance[k] * abs(nl);
