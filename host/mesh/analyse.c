@@ -16,9 +16,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Coordinates beyond this are refused, so that products of two of them still fit in a float. */
-#define COORDINATE_LIMIT 1e18
-
 /* "NAME:LINE: face F" or "NAME: face F". */
 static const char *face_place(const qp_mesh *mesh, const char *name, uint32_t face, char *text, size_t size) {
     if (mesh->face_lines != NULL) {
@@ -31,9 +28,10 @@ static const char *face_place(const qp_mesh *mesh, const char *name, uint32_t fa
 
 static qp_status check_faces(const qp_mesh *mesh, const char *name, qp_error *err) {
     char place[360];
-    if (mesh->n_faces == 0) return qp_fail(err, QP_BAD_INPUT, "%s: the mesh has no faces", name);
+    if (mesh->n_faces == 0) return qp_fail(err, QP_BAD_INPUT, "%.300s: the mesh has no faces", name);
     if (mesh->n_vertices > INT32_MAX || mesh->n_corners > INT32_MAX || mesh->n_creases > INT32_MAX) {
-        return qp_fail(err, QP_BAD_INPUT, "%s: more than 2^31 - 1 vertices, face corners or creases", name);
+        return qp_fail(err, QP_BAD_INPUT, "%.300s: more than 2^31 - 1 vertices, face corners or creases",
+                       name);
     }
     uint32_t *last_face = qp_alloc(mesh->n_vertices, sizeof *last_face, false);
     if (last_face == NULL) return qp_fail_memory(err, mesh->n_vertices * sizeof *last_face, "checking faces");
@@ -68,8 +66,8 @@ static qp_status check_sharpness(const float *sharpness, uint32_t count, const c
                                  qp_error *err) {
     for (uint32_t i = 0; i < count; ++i) {
         if (!(sharpness[i] >= 0)) {
-            return qp_fail(err, QP_BAD_INPUT, "%s: %s %u has sharpness %g (must be 0 or more)", name, what, i,
-                           (double)sharpness[i]);
+            return qp_fail(err, QP_BAD_INPUT, "%.300s: %s %u has sharpness %g (must be 0 or more)", name,
+                           what, i, (double)sharpness[i]);
         }
     }
     return QP_OK;
@@ -79,7 +77,7 @@ static qp_status check_index(const uint32_t *index, size_t count, uint32_t limit
                              const char *what, qp_error *err) {
     for (size_t i = 0; i < count; ++i) {
         if (index[i] >= limit) {
-            return qp_fail(err, QP_BAD_INPUT, "%s: a %s tag names %u of %u", name, what, index[i], limit);
+            return qp_fail(err, QP_BAD_INPUT, "%.300s: a %s tag names %u of %u", name, what, index[i], limit);
         }
     }
     return QP_OK;
@@ -87,15 +85,16 @@ static qp_status check_index(const uint32_t *index, size_t count, uint32_t limit
 
 static qp_status check_values(const qp_mesh *mesh, const char *name, qp_error *err) {
     for (size_t i = 0; i < (size_t)mesh->n_vertices * 3; ++i) {
-        if (!(fabs(mesh->positions[i]) <= COORDINATE_LIMIT)) {
-            return qp_fail(err, QP_BAD_INPUT, "%s: a coordinate of vertex %zu is %g (must be within 1e18)",
-                           name, i / 3, mesh->positions[i]);
+        if (!(fabs(mesh->positions[i]) <= QP_COORDINATE_LIMIT)) {
+            return qp_fail(err, QP_BAD_INPUT,
+                           "%.300s: a coordinate of vertex %zu is %g (must be within 1e18)", name, i / 3,
+                           mesh->positions[i]);
         }
     }
     if ((unsigned)mesh->boundary > QP_BOUNDARY_EDGE_ONLY ||
         (unsigned)mesh->crease_method > QP_CREASE_CHAIKIN ||
         (unsigned)mesh->triangle_rule > QP_TRIANGLE_SMOOTH) {
-        return qp_fail(err, QP_BAD_INPUT, "%s: unknown boundary, crease or triangle rule", name);
+        return qp_fail(err, QP_BAD_INPUT, "%.300s: unknown boundary, crease or triangle rule", name);
     }
     qp_status status = check_sharpness(mesh->crease_sharpness, mesh->n_creases, name, "crease", err);
     if (status == QP_OK) {

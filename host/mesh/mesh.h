@@ -15,6 +15,9 @@
 
 #include "host/base/status.h"
 
+/* Coordinates beyond this are refused, so that products of two of them still fit in a float. */
+#define QP_COORDINATE_LIMIT 1e18
+
 enum { QP_EDGE_BOUNDARY = 1, QP_EDGE_NONMANIFOLD = 2 };
 enum {
     QP_VERTEX_BOUNDARY = 1,    /* touches a boundary edge */

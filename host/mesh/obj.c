@@ -5,6 +5,7 @@
 #include "host/mesh/obj_reader.h"
 
 #include <errno.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -172,6 +173,9 @@ static qp_status read_numbers(obj_reader *r, const char *what, int count, int mo
         if (i < count || (i < most && !obj_at_line_end(r))) {
             qp_status status = obj_read_number(r, what, &value);
             if (status != QP_OK) return status;
+        }
+        if (i < keep && !(fabs(value) <= QP_COORDINATE_LIMIT)) {
+            return obj_fail_at(r, r->line, "%s %g is beyond %g", what, value, QP_COORDINATE_LIMIT);
         }
         if (i < keep) {
             qp_status status = obj_push_double(r, list, value);
