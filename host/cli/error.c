@@ -37,6 +37,8 @@ static void print_json(const char *name, const char *set, const cli_evaluation *
     print_place(&json, "worst_normal", r->worst_normal_patch, r->worst_normal_u, r->worst_normal_v);
     qp_json_integer(&json, "nonfinite", r->nonfinite);
     qp_json_integer(&json, "normals_undefined", r->normals_undefined);
+    qp_json_integer(&json, "normals_parallel", r->normals_parallel);
+    qp_json_real(&json, "parallel_normal_max_deg", r->parallel_normal_max_deg);
     qp_json_integer(&json, "past_depth", r->past_depth);
     qp_json_real(&json, "past_position_max", r->past_position_max);
     qp_json_real(&json, "past_normal_max_deg", r->past_normal_max_deg);
@@ -54,6 +56,8 @@ static void print_text(const char *name, const char *set, const cli_evaluation *
            r->normal_max_deg, r->normal_rms_deg, r->worst_normal_patch, (double)r->worst_normal_u,
            (double)r->worst_normal_v);
     printf("  %" PRIu64 " not finite, %" PRIu64 " without a normal\n", r->nonfinite, r->normals_undefined);
+    printf("  %" PRIu64 " with almost parallel tangents (sine < 0.01), left out above: normal max %.3e\n",
+           r->normals_parallel, r->parallel_normal_max_deg);
     printf("  %" PRIu64 " past the plans' depth, left out above: position max %.3e, normal max %.3e\n",
            r->past_depth, r->past_position_max, r->past_normal_max_deg);
 }

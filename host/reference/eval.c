@@ -35,6 +35,7 @@ static void set_normal(qp_reference_sample *s) {
     double uu = sqrt(s->du[0] * s->du[0] + s->du[1] * s->du[1] + s->du[2] * s->du[2]);
     double vv = sqrt(s->dv[0] * s->dv[0] + s->dv[1] * s->dv[1] + s->dv[2] * s->dv[2]);
     s->normal_defined = nn > 0 && nn >= 1e-6 * uu * vv;
+    s->sine = s->normal_defined ? nn / (uu * vv) : 0;
     for (int c = 0; c < 3; ++c) s->n[c] = s->normal_defined ? n[c] / nn : 0;
 }
 
@@ -72,6 +73,7 @@ static qp_status eval_corner(const visit *t, const cell *at, uint32_t j, qp_refe
     }
     set_normal(s);
     s->normal_defined = s->normal_defined && limit.has_plane;
+    if (!s->normal_defined) s->sine = 0;
     return QP_OK;
 }
 

@@ -13,6 +13,7 @@ typedef struct qp_reference_sample {
     double n[3];         /* unit normal, or 0 where undefined */
     bool normal_defined; /* false where the surface has no tangent plane, or it is too ill-conditioned to tell
                           */
+    double sine; /* |du x dv| / (|du| |dv|): how well the tangents fix the normal; 0 where undefined */
 } qp_reference_sample;
 
 /* Limit position, derivatives and normal of one patch at count points uv[2*i], uv[2*i+1] in [0,1]; exact at
@@ -26,6 +27,8 @@ qp_status qp_reference_eval(const qp_mesh *mesh, const double *positions, uint32
 /* Error measures of DESIGN.md, "Measuring". */
 typedef struct qp_error_report {
     uint64_t samples, past_depth, normals_undefined, nonfinite;
+    uint64_t normals_parallel; /* tangents within 0.57 degrees of parallel (sine < 0.01), measured apart */
+    double parallel_normal_max_deg;
     double position_max, position_rms; /* of the bounding box diagonal */
     double normal_max_deg, normal_rms_deg;
     uint32_t worst_patch;
