@@ -1,13 +1,16 @@
 /* What a frame evaluates: the tessellator's points of every patch.
  *
- * Uniform factor f and n-gons. The children of an n-gon each span half of a base edge, so that one of its
- * edges has a vertex in the middle and the quad beyond it must have one too (the 2k / 4k rule). With m
- * segments along every edge of a child, the quad takes 2m along an edge that it shares with an n-gon, and f
- * along the others: equal            m = ceil(f / 2)       every segment coincides: no cracks for any f
- *   fractional_even  m = 2 ceil(f / 4)     even integers, where the fractional spacings are uniform: no
- * cracks fractional_odd   m = f / 2             no odd number of segments is twice another: edges between
- * quads and n-gons do not match, all others do An even f (a multiple of 4 for fractional_even) thus gives
- * quads f along every edge and children f / 2. */
+ * Uniform factor f and n-gons. The children of an n-gon each span half of a base edge, so that one of its edges
+ * has a vertex in the middle and the quad beyond it must have one too (the 2k / 4k rule). With m segments along
+ * every edge of a child, the quad takes 2m along an edge that it shares with an n-gon, and f along the others.
+ *
+ * - equal, fractional_even: m = f / 2 rounded up to a power of two (at least 2 for fractional_even). No cracks.
+ *   Other numbers would leave some, for the tessellator rounds i / m and i / 2m to 16 bits after the point, each
+ *   on its own.
+ * - fractional_odd: m = f / 2. No odd number of segments is twice another, so edges between quads and n-gons do
+ *   not match; all others do.
+ *
+ * An f that is a power of two, 4 or more, thus gives quads f along every edge and children f / 2. */
 #include "host/frame/frame.h"
 #include "host/frame/tessellator.h"
 #include "kernels/frame_layout.h"
@@ -63,14 +66,10 @@ static uint32_t table_find(grid_table *table, const float factors[FACTORS]) {
 
 /* Segments of a child of an n-gon, see above. */
 static float child_factor(qp_spacing spacing, float f) {
-    switch (spacing) {
-    case QP_EQUAL:
-        return ceilf(f / 2);
-    case QP_FRACTIONAL_EVEN:
-        return 2 * ceilf(f / 4);
-    default:
-        return f / 2;
-    }
+    if (spacing == QP_FRACTIONAL_ODD) return f / 2;
+    float m = spacing == QP_FRACTIONAL_EVEN ? 2 : 1;
+    while (m < f / 2) m *= 2;
+    return m;
 }
 
 /* Marks the edges of faces that are not quads. NULL when memory is out. */
