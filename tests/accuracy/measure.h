@@ -1,0 +1,66 @@
+/* One error measurement: mesh, precision, sample set. */
+#ifndef QP_TESTS_MEASURE_H
+#define QP_TESTS_MEASURE_H
+
+#include "host/plan/plan.h"
+#include "host/reference/reference.h"
+#include "tests/check.h"
+
+#include <string.h>
+
+/* set: "grid" at factor and spacing of *tessellation, or one that qp_sample_set_make knows. */
+static inline int measure(const qp_surface *surface, qp_device *device, qp_precision precision,
+                          const char *set, const qp_tessellation *tessellation, uint64_t samples,
+                          uint64_t seed, qp_error_report *report) {
+    qp_error err = {0};
+    qp_frame *frame = NULL;
+    qp_frame_options options = {.precision = precision};
+    qp_stream stream = {0};
+    qp_sample_set points = {0};
+    int good = CHECK_OK(qp_frame_create(device, surface, &options, &frame, &err), err);
+    if (good && strcmp(set, "grid") == 0) {
+        good = CHECK_OK(qp_frame_eval(frame, tessellation, &stream, &err), err);
+    } else if (good) {
+        good =
+            CHECK_OK(qp_sample_set_make(surface->mesh, set, samples, seed, &points, &err), err) &&
+            CHECK_OK(qp_frame_eval_points(frame, points.count, points.patch, points.uv, &stream, &err), err);
+    }
+    good = good && CHECK_OK(qp_reference_compare(surface->mesh, &stream, report, &err), err);
+    qp_sample_set_free(&points);
+    qp_frame_free(frame);
+    return good;
+}
+
+/* The bounds of issue and README: of the diagonal, degrees. */
+static inline int within_bounds(const qp_error_report *r, qp_precision precision) {
+    double position = precision == QP_DOUBLE ? 1e-12 : 1e-6, normal = precision == QP_DOUBLE ? 1e-6 : 0.05;
+    int good = CHECK(r->position_max <= position);
+    good = CHECK(r->normal_max_deg <= normal) && good;
+    return CHECK(r->nonfinite == 0) && good;
+}
+
+/* Sums over many measurements, for one closing line. */
+typedef struct measure_sum {
+    uint64_t samples, past_depth, undefined, parallel;
+    double position, normal, parallel_normal;
+} measure_sum;
+
+static inline void measure_add(measure_sum *sum, const qp_error_report *r) {
+    sum->samples += r->samples;
+    sum->past_depth += r->past_depth;
+    sum->undefined += r->normals_undefined;
+    sum->parallel += r->normals_parallel;
+    sum->position = fmax(sum->position, r->position_max);
+    sum->normal = fmax(sum->normal, r->normal_max_deg);
+    sum->parallel_normal = fmax(sum->parallel_normal, r->parallel_normal_max_deg);
+}
+
+static inline void measure_print(const char *name, const measure_sum *s) {
+    printf("%s: %llu samples, position max %.3g of the diagonal, normal max %.3g degrees; left out: %llu "
+           "past depth, "
+           "%llu without a normal, %llu with parallel tangents (max %.3g degrees)\n",
+           name, (unsigned long long)s->samples, s->position, s->normal, (unsigned long long)s->past_depth,
+           (unsigned long long)s->undefined, (unsigned long long)s->parallel, s->parallel_normal);
+}
+
+#endif
