@@ -84,6 +84,20 @@ static qp_status read_colour(const reader *r, const json_t *value, const char *p
     return QP_OK;
 }
 
+static qp_status read_palette(const reader *r, const json_t *value, const qp_field *f, const char *place,
+                              double (*out)[3]) {
+    char what[100];
+    size_t n = json_array_size(value);
+    snprintf(what, sizeof what, "an array of one to %.0f colours", f->high);
+    if (n < 1 || (double)n > f->high) return refuse(r, place, what);
+    for (size_t k = 0; k < n; k++) {
+        qp_status status = read_colour(r, json_array_get(value, k), place, out[k]);
+        if (status != QP_OK) return status;
+    }
+    *(uint32_t *)(void *)(r->base + f->count_offset) = (uint32_t)n;
+    return QP_OK;
+}
+
 static qp_status read_choice(const reader *r, const json_t *value, const qp_field *f, const char *place,
                              char *out) {
     char what[160] = "one of";
@@ -133,6 +147,8 @@ static qp_status read_value(const reader *r, json_t *value, const qp_field *f, c
         return read_vector(r, value, f, place, out);
     case QP_FIELD_COLOUR:
         return read_colour(r, value, place, out);
+    case QP_FIELD_PALETTE:
+        return read_palette(r, value, f, place, out);
     case QP_FIELD_TEXT:
         return read_text(r, value, place, out);
     case QP_FIELD_CHOICE:

@@ -12,6 +12,7 @@ typedef enum qp_field_kind {
     QP_FIELD_FLAG,    /* bool */
     QP_FIELD_VECTOR,  /* double[3] in [low, high] */
     QP_FIELD_COLOUR,  /* double[3], linear light: "#rrggbb" (sRGB), or three numbers 0 to 100 */
+    QP_FIELD_PALETTE, /* double[high][3] and, at count_offset, a uint32_t: one to `high` colours */
     QP_FIELD_TEXT,    /* char *, not empty; the struct owns it and starts with NULL */
     QP_FIELD_CHOICE,  /* an enum: index in names */
     QP_FIELD_SECTION, /* an object of its own table */
@@ -25,7 +26,8 @@ typedef struct qp_field {
     double low, high;
     const char *const *names;       /* ends with NULL */
     const struct qp_field *section; /* offsets are of the same struct */
-    int given;                      /* index in the given array that becomes true; 0: none */
+    size_t count_offset;
+    int given; /* index in the given array that becomes true; 0: none */
 } qp_field;
 
 /* Reads JSON text into *target. QP_BAD_INPUT: "NAME:LINE: ..." for what is not JSON, "NAME: section.key: ..."

@@ -1,31 +1,15 @@
-/* The C face of OpenImageIO: a few calls, no exception gets out. */
-#include "host/scene/image.h"
-
+/* The C face of OpenImageIO: a few calls, no exception gets out. A module of its own; see codec.h. */
 extern "C" {
-#include "host/base/output.h"
+#include "host/scene/codec.h"
 }
 
 #include <OpenImageIO/imageio.h>
 
-#include <cctype>
-#include <cerrno>
-#include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <exception>
 #include <string>
 
 namespace {
-
-enum class format { png, exr, other };
-
-format format_of(const char *path) {
-    const char *dot = std::strrchr(path, '.');
-    std::string extension;
-    for (; dot != nullptr && *dot != '\0'; ++dot)
-        extension += static_cast<char>(std::tolower(static_cast<unsigned char>(*dot)));
-    return extension == ".png" ? format::png : extension == ".exr" ? format::exr : format::other;
-}
 
 /* The first line of OpenImageIO's pending message. */
 std::string message() {
@@ -99,42 +83,23 @@ qp_status read_from(const char *path, qp_image *image, bool png, qp_error *err) 
     return QP_OK;
 }
 
+qp_status guarded_write(const char *path, const char *file, const qp_image *image, bool png, qp_error *err) {
+    try {
+        return write_to(path, file, image, png, err);
+    } catch (const std::exception &e) {
+        return qp_fail(err, QP_SYSTEM, "%s: cannot be written: %s", path, e.what());
+    }
+}
+
+qp_status guarded_read(const char *path, qp_image *image, bool png, qp_error *err) {
+    try {
+        return read_from(path, image, png, err);
+    } catch (const std::exception &e) {
+        return qp_fail(err, QP_SYSTEM, "%s: cannot be read: %s", path, e.what());
+    }
+}
+
 } // namespace
 
-extern "C" qp_status qp_image_check_path(const char *path, qp_error *err) {
-    if (format_of(path) != format::other) return QP_OK;
-    return qp_fail(err, QP_BAD_INPUT, "%s: a picture must be named .png or .exr", path);
-}
-
-extern "C" qp_status qp_image_write(const char *path, const qp_image *image, qp_error *err) {
-    qp_status status = qp_image_check_path(path, err);
-    if (status != QP_OK) return status;
-    bool png = format_of(path) == format::png;
-    if (image->width == 0 || image->height == 0 || (png ? image->rgba == nullptr : image->rgba_f == nullptr))
-        return qp_fail(err, QP_BAD_INPUT, "%s: there are no pixels to write", path);
-    char *temporary = qp_output_temporary(path);
-    if (temporary == nullptr) return qp_fail_memory(err, std::strlen(path), "a file name");
-    try {
-        status = write_to(path, temporary, image, png, err);
-    } catch (const std::exception &e) {
-        status = qp_fail(err, QP_SYSTEM, "%s: cannot be written: %s", path, e.what());
-    }
-    if (status == QP_OK && std::rename(temporary, path) != 0)
-        status = qp_fail(err, QP_SYSTEM, "%s: cannot be written: %s", path, std::strerror(errno));
-    if (status != QP_OK) std::remove(temporary);
-    std::free(temporary);
-    return status;
-}
-
-extern "C" qp_status qp_image_read(const char *path, qp_image *image, qp_error *err) {
-    std::memset(image, 0, sizeof *image);
-    qp_status status = qp_image_check_path(path, err);
-    if (status != QP_OK) return status;
-    try {
-        status = read_from(path, image, format_of(path) == format::png, err);
-    } catch (const std::exception &e) {
-        status = qp_fail(err, QP_SYSTEM, "%s: cannot be read: %s", path, e.what());
-    }
-    if (status != QP_OK) qp_image_free(image);
-    return status;
-}
+extern "C" QP_API const qp_image_codec qp_image_module;
+extern "C" const qp_image_codec qp_image_module = {guarded_write, guarded_read};

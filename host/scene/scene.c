@@ -38,7 +38,8 @@ static const char *const boundary_names[] = {"none", "edge_and_corner", "edge_on
 static const char *const crease_names[] = {"uniform", "chaikin", NULL};
 static const char *const triangle_names[] = {"catmark", "smooth", NULL};
 static const char *const spacing_names[] = {"equal", "fractional_even", "fractional_odd", NULL};
-static const char *const colour_names[] = {"material", "kind", "level", "plan", "patch", "normal", NULL};
+static const char *const colour_names[] = {"material", "kind",   "level",     "plan",
+                                           "patch",    "normal", "component", NULL};
 
 static const qp_field mesh_fields[] = {
     {.key = "file", .kind = QP_FIELD_TEXT, .offset = AT(mesh_path), .given = GIVEN_FILE},
@@ -141,6 +142,11 @@ static const qp_field light_fields[] = {
 static const qp_field material_fields[] = {
     {.key = "colour", .kind = QP_FIELD_COLOUR, .offset = AT(colour)},
     {.key = "back_colour", .kind = QP_FIELD_COLOUR, .offset = AT(back_colour)},
+    {.key = "palette",
+     .kind = QP_FIELD_PALETTE,
+     .offset = AT(palette),
+     .high = QP_PALETTE_MAX,
+     .count_offset = AT(palette_count)},
     {.key = "gloss", .kind = QP_FIELD_NUMBER, .offset = AT(gloss), .low = 0, .high = 1},
     {.key = "specular", .kind = QP_FIELD_NUMBER, .offset = AT(specular), .low = 0, .high = 1},
     {0}};
@@ -202,6 +208,13 @@ static const draft defaults = {.scene = {.generate = {.sharpness = -1},
                                          .shadow_samples = 64,
                                          .colour = {0.55, 0.56, 0.58},
                                          .back_colour = {0.5, 0.16, 0.1},
+                                         .palette = {{0.55, 0.56, 0.58},
+                                                     {0.72, 0.36, 0.12},
+                                                     {0.13, 0.28, 0.42},
+                                                     {0.62, 0.55, 0.42},
+                                                     {0.35, 0.09, 0.08},
+                                                     {0.16, 0.32, 0.2}},
+                                         .palette_count = 6,
                                          .gloss = 0.6,
                                          .specular = 0.5,
                                          .ground_colour = {0.5, 0.5, 0.5},
@@ -214,7 +227,7 @@ static const draft defaults = {.scene = {.generate = {.sharpness = -1},
                                          .wire_colour = {0.02, 0.02, 0.03}}};
 
 const char *qp_colour_name(qp_colour colour) {
-    return (unsigned)colour <= QP_COLOUR_NORMAL ? colour_names[colour] : NULL;
+    return (unsigned)colour <= QP_COLOUR_COMPONENT ? colour_names[colour] : NULL;
 }
 
 qp_status qp_colour_from_name(const char *name, qp_colour *colour, qp_error *err) {
@@ -224,7 +237,8 @@ qp_status qp_colour_from_name(const char *name, qp_colour *colour, qp_error *err
             return QP_OK;
         }
     return qp_fail(err, QP_BAD_INPUT,
-                   "no colour mode '%s'; there are material, kind, level, plan, patch, normal", name);
+                   "no colour mode '%s'; there are material, kind, level, plan, patch, normal, component",
+                   name);
 }
 
 /* What the tables cannot express. */

@@ -7,23 +7,26 @@
 /* What a surface is coloured by. */
 typedef enum qp_colour {
     QP_COLOUR_MATERIAL,
-    QP_COLOUR_KIND,   /* quadtree node that evaluates a sample: the paper's figures 2 and 5 */
-    QP_COLOUR_LEVEL,  /* subdivision level of that node */
-    QP_COLOUR_PLAN,   /* one hue a plan: patches that share one look alike */
-    QP_COLOUR_PATCH,  /* one hue a patch */
-    QP_COLOUR_NORMAL, /* the unit normal as a colour */
+    QP_COLOUR_KIND,      /* quadtree node that evaluates a sample: the paper's figures 2 and 5 */
+    QP_COLOUR_LEVEL,     /* subdivision level of that node */
+    QP_COLOUR_PLAN,      /* one hue a plan: patches that share one look alike */
+    QP_COLOUR_PATCH,     /* one hue a patch */
+    QP_COLOUR_NORMAL,    /* the unit normal as a colour */
+    QP_COLOUR_COMPONENT, /* the palette's colours, by connected piece of the mesh */
 } qp_colour;
 /* Name in scene files and on the command line; NULL past the last value. */
 const char *qp_colour_name(qp_colour colour);
 /* QP_BAD_INPUT, listing the names, when there is no such colour. */
 qp_status qp_colour_from_name(const char *name, qp_colour *colour, qp_error *err);
 
-/* A light from a direction. Angles in degrees: azimuth 0 is in front of the scene as the default camera sees
- * it and grows to the viewer's right; elevation up from the horizon. size: half-angle of the disc it comes
+/* A light from a direction. Angles in degrees: azimuth is counted from the camera to its right, elevation up from
+ * the horizon. size: half-angle of the disc it comes
  * from, which softens its shadow. */
 typedef struct qp_light {
     double azimuth, elevation, size, intensity, colour[3];
 } qp_light;
+
+enum { QP_PALETTE_MAX = 16 };
 
 typedef struct qp_scene {
     char *path; /* of the file, for messages */
@@ -52,9 +55,11 @@ typedef struct qp_scene {
     double sky_zenith[3], sky_horizon[3], sky_ground[3], sky_intensity;
     uint32_t shadow_samples; /* directions from which shadows are cast; 0: none */
 
-    double colour[3], back_colour[3]; /* linear, of front and back */
-    double gloss, specular;           /* 0..1 */
-    bool ground;                      /* a plane under the mesh that catches the shadow */
+    double colour[3], back_colour[3];  /* linear, of front and back */
+    double palette[QP_PALETTE_MAX][3]; /* for QP_COLOUR_COMPONENT, in turn */
+    uint32_t palette_count;
+    double gloss, specular; /* 0..1 */
+    bool ground;            /* a plane under the mesh that catches the shadow */
     double ground_colour[3];
     double background_top[3], background_bottom[3], background_alpha;
 
