@@ -23,7 +23,6 @@
     X(BindRenderbuffer, BINDRENDERBUFFER)                                                                    \
     X(BindTexture, BINDTEXTURE)                                                                              \
     X(BindVertexArray, BINDVERTEXARRAY)                                                                      \
-    X(BlitFramebuffer, BLITFRAMEBUFFER)                                                                      \
     X(BufferData, BUFFERDATA)                                                                                \
     X(CheckFramebufferStatus, CHECKFRAMEBUFFERSTATUS)                                                        \
     X(Clear, CLEAR)                                                                                          \
@@ -43,12 +42,14 @@
     X(Disable, DISABLE)                                                                                      \
     X(DrawArrays, DRAWARRAYS)                                                                                \
     X(DrawBuffer, DRAWBUFFER)                                                                                \
+    X(DrawBuffers, DRAWBUFFERS)                                                                              \
     X(DrawElements, DRAWELEMENTS)                                                                            \
     X(Enable, ENABLE)                                                                                        \
     X(EnableVertexAttribArray, ENABLEVERTEXATTRIBARRAY)                                                      \
     X(EndQuery, ENDQUERY)                                                                                    \
     X(EndTransformFeedback, ENDTRANSFORMFEEDBACK)                                                            \
     X(FramebufferRenderbuffer, FRAMEBUFFERRENDERBUFFER)                                                      \
+    X(FramebufferTexture2D, FRAMEBUFFERTEXTURE2D)                                                            \
     X(FramebufferTextureLayer, FRAMEBUFFERTEXTURELAYER)                                                      \
     X(GenBuffers, GENBUFFERS)                                                                                \
     X(GenFramebuffers, GENFRAMEBUFFERS)                                                                      \
@@ -75,6 +76,7 @@
     X(RenderbufferStorage, RENDERBUFFERSTORAGE)                                                              \
     X(RenderbufferStorageMultisample, RENDERBUFFERSTORAGEMULTISAMPLE)                                        \
     X(ShaderSource, SHADERSOURCE)                                                                            \
+    X(TexImage2DMultisample, TEXIMAGE2DMULTISAMPLE)                                                          \
     X(TexImage3D, TEXIMAGE3D)                                                                                \
     X(TexParameteri, TEXPARAMETERI)                                                                          \
     X(TransformFeedbackVaryings, TRANSFORMFEEDBACKVARYINGS)                                                  \

@@ -9,18 +9,23 @@
 
 enum { SHADOW_SIDE = 1024, BATCH = 1 << 17, SAMPLES = 4 };
 
+enum { PLACE, FACING, MATERIAL, MAPS };
+static const GLenum map_formats[MAPS] = {GL_RGBA32F, GL_RGBA16F, GL_RGBA16F};
+
 typedef struct drawing {
     qp_gl *gl;
     const qp_draw_input *in;
     uint32_t lights, lamp_count;
     bool shadowed;
     qp_lamp *lamps;
-    GLuint shadow_program, surface_program, ground_program, background_program;
+    double ground_centre[3], ground_u[3], ground_v[3]; /* of the ground's square */
+    GLuint shadow_program, surface_program, ground_program, shade_program;
     GLuint points_array, corners_array, empty_array;
     GLuint points, indices, corners; /* buffers */
     GLuint shadows;                  /* texture array, one layer a light */
-    GLuint shadow_target, target, resolved;
-    GLuint colour, depth, resolved_colour;
+    GLuint maps[MAPS];               /* multisampled textures: what geometry.frag.glsl writes */
+    GLuint shadow_target, geometry_target, target;
+    GLuint depth, colour; /* renderbuffers */
 } drawing;
 
 /* ---- Set-up ---- */
@@ -28,18 +33,17 @@ typedef struct drawing {
 static qp_status make_programs(drawing *d, qp_error *err) {
     char defines[64];
     snprintf(defines, sizeof defines, "#define LIGHTS %u\n", d->lights);
-    qp_gl_program_desc surface = {
-        .vertex = "surface.vert.glsl", .fragment = "surface.frag.glsl", .defines = defines};
-    qp_gl_program_desc background = {.vertex = "screen.vert.glsl", .fragment = "background.frag.glsl"};
+    qp_gl_program_desc surface = {.vertex = "surface.vert.glsl", .fragment = "geometry.frag.glsl"};
+    qp_gl_program_desc ground = {
+        .vertex = "ground.vert.glsl", .fragment = "geometry.frag.glsl", .defines = "#define GROUND\n"};
+    qp_gl_program_desc shade = {
+        .vertex = "screen.vert.glsl", .fragment = "shade.frag.glsl", .defines = defines};
     qp_gl_program_desc shadow = {.vertex = "shadow.vert.glsl", .fragment = "shadow.frag.glsl"};
     qp_status status = qp_gl_make_program(d->gl, &surface, &d->surface_program, err);
-    if (status == QP_OK) status = qp_gl_make_program(d->gl, &background, &d->background_program, err);
+    if (status == QP_OK) status = qp_gl_make_program(d->gl, &ground, &d->ground_program, err);
+    if (status == QP_OK) status = qp_gl_make_program(d->gl, &shade, &d->shade_program, err);
     if (status == QP_OK) status = qp_gl_make_program(d->gl, &shadow, &d->shadow_program, err);
-    if (status != QP_OK || !d->in->scene->ground) return status;
-    snprintf(defines, sizeof defines, "#define LIGHTS %u\n#define GROUND\n", d->lights);
-    qp_gl_program_desc ground = {
-        .vertex = "ground.vert.glsl", .fragment = "surface.frag.glsl", .defines = defines};
-    return qp_gl_make_program(d->gl, &ground, &d->ground_program, err);
+    return status;
 }
 
 static void attribute(qp_gl *gl, GLuint index, GLint size, GLenum type, size_t stride, size_t offset) {
@@ -74,14 +78,6 @@ static void make_buffers(drawing *d) {
     attribute(gl, 3, 3, GL_UNSIGNED_BYTE, sizeof(qp_corner), offsetof(qp_corner, colour));
 }
 
-static void make_renderbuffer(qp_gl *gl, GLuint *buffer, int samples, GLenum format, GLenum place, int width,
-                              int height) {
-    QP_GL(gl, GenRenderbuffers(1, buffer));
-    QP_GL(gl, BindRenderbuffer(GL_RENDERBUFFER, *buffer));
-    QP_GL(gl, RenderbufferStorageMultisample(GL_RENDERBUFFER, samples, format, width, height));
-    QP_GL(gl, FramebufferRenderbuffer(GL_FRAMEBUFFER, place, GL_RENDERBUFFER, *buffer));
-}
-
 static qp_status check_target(qp_gl *gl, qp_error *err) {
     GLenum state = gl->CheckFramebufferStatus(GL_FRAMEBUFFER);
     qp_gl_note(gl, "glCheckFramebufferStatus");
@@ -94,15 +90,31 @@ static qp_status check_target(qp_gl *gl, qp_error *err) {
 static qp_status make_targets(drawing *d, qp_error *err) {
     qp_gl *gl = d->gl;
     int width = (int)d->in->scene->width, height = (int)d->in->scene->height;
-    QP_GL(gl, GenFramebuffers(1, &d->target));
-    QP_GL(gl, BindFramebuffer(GL_FRAMEBUFFER, d->target));
-    make_renderbuffer(gl, &d->colour, SAMPLES, GL_RGBA16F, GL_COLOR_ATTACHMENT0, width, height);
-    make_renderbuffer(gl, &d->depth, SAMPLES, GL_DEPTH_COMPONENT32F, GL_DEPTH_ATTACHMENT, width, height);
+    QP_GL(gl, GenFramebuffers(1, &d->geometry_target));
+    QP_GL(gl, BindFramebuffer(GL_FRAMEBUFFER, d->geometry_target));
+    QP_GL(gl, GenTextures(MAPS, d->maps));
+    GLenum places[MAPS];
+    for (int k = 0; k < MAPS; k++) {
+        places[k] = GL_COLOR_ATTACHMENT0 + (GLenum)k;
+        QP_GL(gl, ActiveTexture(GL_TEXTURE1 + (GLenum)k));
+        QP_GL(gl, BindTexture(GL_TEXTURE_2D_MULTISAMPLE, d->maps[k]));
+        QP_GL(gl, TexImage2DMultisample(GL_TEXTURE_2D_MULTISAMPLE, SAMPLES, map_formats[k], width, height,
+                                        GL_TRUE));
+        QP_GL(gl, FramebufferTexture2D(GL_FRAMEBUFFER, places[k], GL_TEXTURE_2D_MULTISAMPLE, d->maps[k], 0));
+    }
+    QP_GL(gl, DrawBuffers(MAPS, places));
+    QP_GL(gl, GenRenderbuffers(1, &d->depth));
+    QP_GL(gl, BindRenderbuffer(GL_RENDERBUFFER, d->depth));
+    QP_GL(gl, RenderbufferStorageMultisample(GL_RENDERBUFFER, SAMPLES, GL_DEPTH_COMPONENT32F, width, height));
+    QP_GL(gl, FramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, d->depth));
     qp_status status = check_target(gl, err);
     if (status != QP_OK) return status;
-    QP_GL(gl, GenFramebuffers(1, &d->resolved));
-    QP_GL(gl, BindFramebuffer(GL_FRAMEBUFFER, d->resolved));
-    make_renderbuffer(gl, &d->resolved_colour, 0, GL_RGBA16F, GL_COLOR_ATTACHMENT0, width, height);
+    QP_GL(gl, GenFramebuffers(1, &d->target));
+    QP_GL(gl, BindFramebuffer(GL_FRAMEBUFFER, d->target));
+    QP_GL(gl, GenRenderbuffers(1, &d->colour));
+    QP_GL(gl, BindRenderbuffer(GL_RENDERBUFFER, d->colour));
+    QP_GL(gl, RenderbufferStorage(GL_RENDERBUFFER, GL_RGBA32F, width, height));
+    QP_GL(gl, FramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, d->colour));
     return check_target(gl, err);
 }
 
@@ -164,77 +176,34 @@ static void set_scaled(qp_gl *gl, GLuint program, const char *name, const double
     set_vector(gl, program, name, scaled);
 }
 
-static void set_light(drawing *d, GLuint program) {
-    qp_gl *gl = d->gl;
-    const qp_scene *s = d->in->scene;
-    const qp_view *view = d->in->view;
-    char name[40];
-    for (uint32_t k = 0; k < d->lights; k++) {
-        snprintf(name, sizeof name, "light_direction[%u]", k);
-        QP_GL(gl, Uniform3fv(gl->GetUniformLocation(program, name), 1, d->lamps[k].direction));
-        snprintf(name, sizeof name, "light_radiance[%u]", k);
-        QP_GL(gl, Uniform3fv(gl->GetUniformLocation(program, name), 1, d->lamps[k].radiance));
-        snprintf(name, sizeof name, "light_rows[%u]", 3 * k);
-        QP_GL(gl, Uniform4fv(gl->GetUniformLocation(program, name), 3, d->lamps[k].rows));
-    }
-    set_int(gl, program, "light_count", (int)d->lights);
-    set_int(gl, program, "lamp_count", (int)d->lamp_count);
-    set_int(gl, program, "has_shadows", d->shadowed);
-    set_int(gl, program, "shadows", 0);
-    set_float(gl, program, "shadow_offset", 3.0 * view->radius / SHADOW_SIDE);
-    set_vector(gl, program, "up", view->world_up);
-    set_vector(gl, program, "eye", view->eye);
-    set_scaled(gl, program, "sky_zenith", s->sky_zenith, s->sky_intensity);
-    set_scaled(gl, program, "sky_horizon", s->sky_horizon, s->sky_intensity);
-    set_scaled(gl, program, "sky_ground", s->sky_ground, s->sky_intensity);
-    set_float(gl, program, "exposure", s->exposure);
-}
-
-static void set_background(drawing *d, GLuint program) {
-    const qp_scene *s = d->in->scene;
-    set_vector(d->gl, program, "background_top", s->background_top);
-    set_vector(d->gl, program, "background_bottom", s->background_bottom);
-    set_float(d->gl, program, "background_alpha", s->background_alpha);
-    set_float(d->gl, program, "height", s->height);
-}
-
-static void draw_background(drawing *d) {
-    qp_gl *gl = d->gl;
-    QP_GL(gl, Disable(GL_DEPTH_TEST));
-    QP_GL(gl, UseProgram(d->background_program));
-    set_background(d, d->background_program);
-    QP_GL(gl, BindVertexArray(d->empty_array));
-    QP_GL(gl, DrawArrays(GL_TRIANGLES, 0, 3));
-    QP_GL(gl, Enable(GL_DEPTH_TEST));
-}
-
 /* Under the lowest point, a little below it so that the two do not fight. */
-static void draw_ground(drawing *d) {
-    qp_gl *gl = d->gl;
+static void place_ground(drawing *d) {
     const qp_view *view = d->in->view;
-    double centre[3], u[3], v[3], side = 10 * view->radius, lift = view->floor - 2e-3 * view->radius;
-    for (int k = 0; k < 3; k++) lift -= view->world_up[k] * view->centre[k];
     const double *up = view->world_up;
-    int least = fabs(up[0]) <= fabs(up[1]) && fabs(up[0]) <= fabs(up[2]) ? 0
-                : fabs(up[1]) <= fabs(up[2])                             ? 1
-                                                                         : 2;
-    double axis[3] = {0, 0, 0}, along = up[least] * side;
-    axis[least] = side;
+    double side = 10 * view->radius, lift = view->floor - 2e-3 * view->radius;
+    for (int k = 0; k < 3; k++) lift -= up[k] * view->centre[k];
+    int least = 0; /* the axis that is least along up gives a direction across it */
+    for (int k = 1; k < 3; k++)
+        if (fabs(up[k]) < fabs(up[least])) least = k;
+    double *u = d->ground_u, *v = d->ground_v;
     for (int k = 0; k < 3; k++) {
-        centre[k] = view->centre[k] + lift * up[k];
-        u[k] = axis[k] - along * up[k];
+        d->ground_centre[k] = view->centre[k] + lift * up[k];
+        u[k] = side * ((k == least) - up[least] * up[k]);
     }
     for (int k = 0; k < 3; k++) v[k] = up[(k + 1) % 3] * u[(k + 2) % 3] - up[(k + 2) % 3] * u[(k + 1) % 3];
-    QP_GL(gl, UseProgram(d->ground_program));
-    set_light(d, d->ground_program);
-    set_background(d, d->ground_program);
-    QP_GL(gl, UniformMatrix4fv(gl->GetUniformLocation(d->ground_program, "view_projection"), 1, GL_FALSE,
-                               view->view_projection));
-    set_vector(gl, d->ground_program, "ground_centre", centre);
-    set_vector(gl, d->ground_program, "ground_u", u);
-    set_vector(gl, d->ground_program, "ground_v", v);
-    set_vector(gl, d->ground_program, "ground_colour", d->in->scene->ground_colour);
-    set_float(gl, d->ground_program, "ground_fade", 6 * view->radius);
+}
+
+static void draw_ground(drawing *d) {
+    qp_gl *gl = d->gl;
+    GLuint program = d->ground_program;
+    QP_GL(gl, UseProgram(program));
+    QP_GL(gl, UniformMatrix4fv(gl->GetUniformLocation(program, "view_projection"), 1, GL_FALSE,
+                               d->in->view->view_projection));
+    set_vector(gl, program, "ground_centre", d->ground_centre);
+    set_vector(gl, program, "ground_u", d->ground_u);
+    set_vector(gl, program, "ground_v", d->ground_v);
+    set_vector(gl, program, "up", d->in->view->world_up);
+    set_vector(gl, program, "ground_colour", d->in->scene->ground_colour);
     QP_GL(gl, BindVertexArray(d->empty_array));
     QP_GL(gl, DrawArrays(GL_TRIANGLE_STRIP, 0, 4));
 }
@@ -243,19 +212,14 @@ static qp_status draw_surface(drawing *d, qp_error *err) {
     qp_gl *gl = d->gl;
     const qp_scene *s = d->in->scene;
     GLuint program = d->surface_program;
+    bool lines = s->colour_by == QP_COLOUR_KIND || s->colour_by == QP_COLOUR_LEVEL ||
+                 s->colour_by == QP_COLOUR_PLAN || s->colour_by == QP_COLOUR_PATCH;
     QP_GL(gl, UseProgram(program));
-    set_light(d, program);
     QP_GL(gl, UniformMatrix4fv(gl->GetUniformLocation(program, "view_projection"), 1, GL_FALSE,
                                d->in->view->view_projection));
-    bool material = s->colour_by == QP_COLOUR_MATERIAL;
-    set_vector(gl, program, "back_colour", s->back_colour);
-    set_int(gl, program, "use_back_colour", material);
-    set_int(gl, program, "show_normals", s->colour_by == QP_COLOUR_NORMAL);
-    set_float(gl, program, "gloss", material ? s->gloss : 0.3);
-    set_float(gl, program, "specular", material ? s->specular : 0.3);
+    set_vector(gl, program, "eye", d->in->view->eye);
     set_float(gl, program, "wire_width", s->wire_width);
-    set_vector(gl, program, "wire_colour", s->wire_colour);
-    set_float(gl, program, "border_width", material || s->colour_by == QP_COLOUR_NORMAL ? 0 : 1.6);
+    set_float(gl, program, "border_width", lines ? 1.6 : 0);
     QP_GL(gl, BindVertexArray(d->corners_array));
     QP_GL(gl, BindBuffer(GL_ARRAY_BUFFER, d->corners));
     qp_corner *corners = qp_alloc(3 * BATCH, sizeof *corners, false);
@@ -271,13 +235,76 @@ static qp_status draw_surface(drawing *d, qp_error *err) {
     return qp_gl_status(gl, err);
 }
 
+static qp_status draw_geometry(drawing *d, qp_error *err) {
+    qp_gl *gl = d->gl;
+    QP_GL(gl, BindFramebuffer(GL_FRAMEBUFFER, d->geometry_target));
+    QP_GL(gl, Viewport(0, 0, (GLsizei)d->in->scene->width, (GLsizei)d->in->scene->height));
+    QP_GL(gl, Enable(GL_DEPTH_TEST));
+    QP_GL(gl, ClearColor(0, 0, 0, 0));
+    QP_GL(gl, Clear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT));
+    if (d->in->scene->ground) draw_ground(d);
+    qp_status status = draw_surface(d, err);
+    QP_GL(gl, Disable(GL_DEPTH_TEST));
+    return status;
+}
+
+static void set_lights(drawing *d, GLuint program) {
+    qp_gl *gl = d->gl;
+    const qp_scene *s = d->in->scene;
+    char name[40];
+    for (uint32_t k = 0; k < d->lights; k++) {
+        snprintf(name, sizeof name, "light_direction[%u]", k);
+        QP_GL(gl, Uniform3fv(gl->GetUniformLocation(program, name), 1, d->lamps[k].direction));
+        snprintf(name, sizeof name, "light_radiance[%u]", k);
+        QP_GL(gl, Uniform3fv(gl->GetUniformLocation(program, name), 1, d->lamps[k].radiance));
+        snprintf(name, sizeof name, "light_rows[%u]", 3 * k);
+        QP_GL(gl, Uniform4fv(gl->GetUniformLocation(program, name), 3, d->lamps[k].rows));
+    }
+    set_int(gl, program, "light_count", (int)d->lights);
+    set_int(gl, program, "lamp_count", (int)d->lamp_count);
+    set_int(gl, program, "has_shadows", d->shadowed);
+    set_scaled(gl, program, "sky_zenith", s->sky_zenith, s->sky_intensity);
+    set_scaled(gl, program, "sky_horizon", s->sky_horizon, s->sky_intensity);
+    set_scaled(gl, program, "sky_ground", s->sky_ground, s->sky_intensity);
+}
+
+static void draw_light(drawing *d) {
+    qp_gl *gl = d->gl;
+    const qp_scene *s = d->in->scene;
+    const qp_view *view = d->in->view;
+    GLuint program = d->shade_program;
+    bool polished = s->colour_by == QP_COLOUR_MATERIAL || s->colour_by == QP_COLOUR_COMPONENT;
+    QP_GL(gl, BindFramebuffer(GL_FRAMEBUFFER, d->target));
+    QP_GL(gl, UseProgram(program));
+    set_lights(d, program);
+    set_int(gl, program, "shadows", 0);
+    set_int(gl, program, "place_map", 1 + PLACE);
+    set_int(gl, program, "facing_map", 1 + FACING);
+    set_int(gl, program, "material_map", 1 + MATERIAL);
+    set_float(gl, program, "shadow_offset", 3.0 * view->radius / SHADOW_SIDE);
+    set_float(gl, program, "radius", view->radius);
+    set_vector(gl, program, "up", view->world_up);
+    set_vector(gl, program, "eye", view->eye);
+    set_float(gl, program, "exposure", s->exposure);
+    set_vector(gl, program, "back_colour", s->back_colour);
+    set_int(gl, program, "use_back_colour", polished);
+    set_int(gl, program, "show_normals", s->colour_by == QP_COLOUR_NORMAL);
+    set_float(gl, program, "gloss", polished ? s->gloss : 0.3);
+    set_float(gl, program, "specular", polished ? s->specular : 0.3);
+    set_vector(gl, program, "wire_colour", s->wire_colour);
+    set_vector(gl, program, "ground_centre", d->ground_centre);
+    set_float(gl, program, "ground_fade", 6 * view->radius);
+    set_vector(gl, program, "background_top", s->background_top);
+    set_vector(gl, program, "background_bottom", s->background_bottom);
+    set_float(gl, program, "background_alpha", s->background_alpha);
+    set_float(gl, program, "height", s->height);
+    QP_GL(gl, BindVertexArray(d->empty_array));
+    QP_GL(gl, DrawArrays(GL_TRIANGLES, 0, 3));
+}
+
 static qp_status read_back(drawing *d, float *pixels, qp_error *err) {
     qp_gl *gl = d->gl;
     int width = (int)d->in->scene->width, height = (int)d->in->scene->height;
-    QP_GL(gl, BindFramebuffer(GL_READ_FRAMEBUFFER, d->target));
-    QP_GL(gl, BindFramebuffer(GL_DRAW_FRAMEBUFFER, d->resolved));
-    QP_GL(gl, BlitFramebuffer(0, 0, width, height, 0, 0, width, height, GL_COLOR_BUFFER_BIT, GL_NEAREST));
-    QP_GL(gl, BindFramebuffer(GL_FRAMEBUFFER, d->resolved));
     QP_GL(gl, PixelStorei(GL_PACK_ALIGNMENT, 4));
     /* GL counts rows from the bottom. */
     for (int y = 0; y < height; y++)
@@ -288,19 +315,19 @@ static qp_status read_back(drawing *d, float *pixels, qp_error *err) {
 
 static void free_drawing(drawing *d) {
     qp_gl *gl = d->gl;
-    const GLuint programs[] = {d->shadow_program, d->surface_program, d->ground_program,
-                               d->background_program};
+    const GLuint programs[] = {d->shadow_program, d->surface_program, d->ground_program, d->shade_program};
     for (size_t k = 0; k < sizeof programs / sizeof programs[0]; k++)
         if (programs[k] != 0) QP_GL(gl, DeleteProgram(programs[k]));
     const GLuint arrays[] = {d->points_array, d->corners_array, d->empty_array};
     const GLuint buffers[] = {d->points, d->indices, d->corners};
-    const GLuint targets[] = {d->shadow_target, d->target, d->resolved};
-    const GLuint renderbuffers[] = {d->colour, d->depth, d->resolved_colour};
+    const GLuint targets[] = {d->shadow_target, d->geometry_target, d->target};
+    const GLuint renderbuffers[] = {d->colour, d->depth};
     QP_GL(gl, DeleteVertexArrays(3, arrays)); /* 0 is ignored in all of these */
     QP_GL(gl, DeleteBuffers(3, buffers));
     QP_GL(gl, DeleteFramebuffers(3, targets));
-    QP_GL(gl, DeleteRenderbuffers(3, renderbuffers));
+    QP_GL(gl, DeleteRenderbuffers(2, renderbuffers));
     QP_GL(gl, DeleteTextures(1, &d->shadows));
+    QP_GL(gl, DeleteTextures(MAPS, d->maps));
     free(d->lamps);
 }
 
@@ -323,6 +350,7 @@ qp_status qp_gl_draw(qp_gl *gl, const qp_draw_input *input, float *pixels, qp_er
     choose_lights(&d);
     d.lamps = qp_alloc(d.lights, sizeof *d.lamps, true);
     if (d.lamps == NULL) return qp_fail_memory(err, d.lights * sizeof *d.lamps, "lights");
+    place_ground(&d);
     qp_view_lamps(input->scene, input->view, d.lights, d.lamps, &d.lamp_count);
     qp_status status = make_programs(&d, err);
     if (status == QP_OK) {
@@ -330,15 +358,11 @@ qp_status qp_gl_draw(qp_gl *gl, const qp_draw_input *input, float *pixels, qp_er
         status = draw_shadows(&d, err);
     }
     if (status == QP_OK) status = make_targets(&d, err);
+    if (status == QP_OK) status = draw_geometry(&d, err);
     if (status == QP_OK) {
-        QP_GL(gl, BindFramebuffer(GL_FRAMEBUFFER, d.target));
-        QP_GL(gl, Viewport(0, 0, (GLsizei)input->scene->width, (GLsizei)input->scene->height));
-        QP_GL(gl, Clear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT));
-        draw_background(&d);
-        if (input->scene->ground) draw_ground(&d);
-        status = draw_surface(&d, err);
+        draw_light(&d);
+        status = read_back(&d, pixels, err);
     }
-    if (status == QP_OK) status = read_back(&d, pixels, err);
     free_drawing(&d);
     return status;
 }

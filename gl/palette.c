@@ -2,6 +2,7 @@
 #include "host/frame/classify.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 /* By QP_NODE_*; internal nodes evaluate nothing. */
@@ -48,12 +49,50 @@ static qp_leaf leaf_of(const qp_surface *surface, const qp_stream *stream, const
     return qp_classify(surface->plans[surface->patch_plan[patch]], u, v);
 }
 
-void qp_triangle_colour(const qp_scene *scene, const qp_surface *surface, const qp_stream *stream,
-                        const uint32_t triangle[3], float colour[3]) {
+static uint32_t root_of(uint32_t *parent, uint32_t v) {
+    while (parent[v] != v) v = parent[v] = parent[parent[v]];
+    return v;
+}
+
+qp_status qp_patch_components(const qp_mesh *mesh, uint32_t **component, qp_error *err) {
+    uint32_t *parent = qp_alloc(mesh->n_vertices, sizeof *parent, false); /* vertices joined by a face */
+    uint32_t *number = qp_alloc(mesh->n_vertices, sizeof *number, false);
+    *component = qp_alloc(mesh->n_patches, sizeof **component, false);
+    if (parent == NULL || number == NULL || *component == NULL) {
+        free(parent);
+        free(number);
+        free(*component);
+        *component = NULL;
+        return qp_fail_memory(err, 4 * ((size_t)mesh->n_patches + 2 * (size_t)mesh->n_vertices),
+                              "components");
+    }
+    for (uint32_t v = 0; v < mesh->n_vertices; v++) parent[v] = v, number[v] = QP_NONE;
+    for (uint32_t c = 0; c < mesh->n_corners; c++) {
+        uint32_t a = root_of(parent, mesh->face_vertices[c]);
+        uint32_t b = root_of(parent, mesh->face_vertices[qp_corner_next(mesh, c)]);
+        parent[a] = b;
+    }
+    uint32_t count = 0;
+    for (uint32_t f = 0; f < mesh->n_faces; f++) {
+        uint32_t root = root_of(parent, mesh->face_vertices[mesh->face_offsets[f]]);
+        if (number[root] == QP_NONE) number[root] = count++;
+        for (uint32_t p = mesh->patch_offsets[f]; p < mesh->patch_offsets[f + 1]; p++)
+            (*component)[p] = number[root];
+    }
+    free(parent);
+    free(number);
+    return QP_OK;
+}
+
+void qp_triangle_colour(const qp_scene *scene, const qp_surface *surface, const uint32_t *component,
+                        const qp_stream *stream, const uint32_t triangle[3], float colour[3]) {
     uint32_t patch = stream->sample_patch[triangle[0]];
-    bool planned = surface != NULL && surface->patch_plan[patch] != QP_NONE;
+    bool planned = surface->patch_plan[patch] != QP_NONE;
     for (int k = 0; k < 3; k++) colour[k] = (float)scene->colour[k];
-    if (scene->colour_by == QP_COLOUR_PATCH) {
+    if (scene->colour_by == QP_COLOUR_COMPONENT) {
+        const double *own = scene->palette[component[patch] % scene->palette_count];
+        for (int k = 0; k < 3; k++) colour[k] = (float)own[k];
+    } else if (scene->colour_by == QP_COLOUR_PATCH) {
         of_index(patch, colour);
     } else if (scene->colour_by == QP_COLOUR_PLAN && planned) {
         if (surface->patch_plan[patch] == surface->regular_plan)

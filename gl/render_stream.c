@@ -11,7 +11,8 @@ typedef struct job {
     const qp_scene *scene;
     const qp_surface *surface;
     const qp_stream *stream;
-    float *positions; /* 3 a sample */
+    float *positions;    /* 3 a sample */
+    uint32_t *component; /* of a patch, or NULL */
 } job;
 
 static float component(const qp_stream *stream, size_t sample, size_t k) {
@@ -25,7 +26,7 @@ static void fill_corners(const void *context, uint64_t first, uint64_t count, qp
         const uint32_t *triangle = j->stream->triangles + 3 * t;
         float colour[3];
         uint8_t bytes[4] = {0, 0, 0, 255};
-        qp_triangle_colour(j->scene, j->surface, j->stream, triangle, colour);
+        qp_triangle_colour(j->scene, j->surface, j->component, j->stream, triangle, colour);
         for (int k = 0; k < 3; k++) bytes[k] = (uint8_t)(sqrtf(fminf(fmaxf(colour[k], 0), 1)) * 255 + 0.5f);
         for (int c = 0; c < 3; c++, corners++) {
             size_t sample = triangle[c];
@@ -91,11 +92,13 @@ qp_status qp_render_stream(const qp_scene *scene, const qp_surface *surface, con
                            qp_image *out, char backend_used[128], qp_error *err) {
     memset(out, 0, sizeof *out);
     backend_used[0] = '\0';
-    job j = {scene, surface, stream, NULL};
+    job j = {scene, surface, stream, NULL, NULL};
     qp_gl *gl = NULL;
     qp_view view;
     qp_status status = check_stream(surface, stream, err);
     if (status == QP_OK) status = take_positions(&j, err);
+    if (status == QP_OK && scene->colour_by == QP_COLOUR_COMPONENT)
+        status = qp_patch_components(surface->mesh, &j.component, err);
     if (status == QP_OK) status = qp_image_create(scene->width, scene->height, out, err);
     if (status == QP_OK) status = qp_gl_open(&gl, err);
     if (status == QP_OK) {
@@ -110,5 +113,6 @@ qp_status qp_render_stream(const qp_scene *scene, const qp_surface *surface, con
     if (status != QP_OK) qp_image_free(out);
     qp_gl_close(gl);
     free(j.positions);
+    free(j.component);
     return status;
 }

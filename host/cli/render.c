@@ -5,7 +5,7 @@
 #include <inttypes.h>
 #include <stdlib.h>
 
-#define COLOURS "material|kind|level|plan|patch|normal"
+#define COLOURS "material|kind|level|plan|patch|normal|component"
 
 /* What the command line asks for over what the scene says. */
 typedef struct overrides {
