@@ -33,7 +33,7 @@ static inline int measure(const qp_surface *surface, qp_device *device, qp_preci
 
 /* The bounds of issue and README: of the diagonal, degrees. */
 static inline int within_bounds(const qp_error_report *r, qp_precision precision) {
-    double position = precision == QP_DOUBLE ? 1e-12 : 1e-6, normal = precision == QP_DOUBLE ? 1e-6 : 0.05;
+    double position = precision == QP_DOUBLE ? 1e-12 : 1e-6, normal = precision == QP_DOUBLE ? 1e-4 : 0.05;
     int good = CHECK(r->position_max <= position);
     good = CHECK(r->normal_max_deg <= normal) && good;
     return CHECK(r->nonfinite == 0) && good;
