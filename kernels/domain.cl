@@ -7,16 +7,24 @@
 /* One of the points of a node: 16-bit index number k of the words at `words`. */
 #define QP_POINT(words, k) support[((words)[(k) >> 1] >> (((k)&1u) << 4)) & 0xffffu]
 
+/* One row of points, two a word. */
+QP_FUNCTION void QP_NAME(add_words)(__global const real4 *support, __global const uint *words, int first,
+                                    const real bu[4], const real du[4], real bv, real dv,
+                                    QP_NAME(surface_point) * s) {
+    const uint left = words[0], right = words[1];
+    QP_NAME(add_row)
+    (s, first, support[left & 0xffffu], support[left >> 16], support[right & 0xffffu], support[right >> 16],
+     bu, du, bv, dv);
+}
+
 /* 16 points, row-major, with the row weights given. */
 QP_FUNCTION void QP_NAME(spline_grid)(__global const real4 *support, __global const uint *words,
                                       const real bu[4], const real du[4], const real bv[4], const real dv[4],
                                       QP_NAME(surface_point) * s) {
-    for (uint j = 0; j < 4u; ++j) {
-        const uint left = words[2u * j], right = words[2u * j + 1u];
-        QP_NAME(add_row)
-        (s, j == 0, support[left & 0xffffu], support[left >> 16], support[right & 0xffffu],
-         support[right >> 16], bu, du, bv[j], dv[j]);
-    }
+    QP_NAME(add_words)(support, words, 1, bu, du, bv[0], dv[0], s);
+    QP_NAME(add_words)(support, words + 2, 0, bu, du, bv[1], dv[1], s);
+    QP_NAME(add_words)(support, words + 4, 0, bu, du, bv[2], dv[2], s);
+    QP_NAME(add_words)(support, words + 6, 0, bu, du, bv[3], dv[3], s);
 }
 
 QP_FUNCTION void QP_NAME(add_origin)(__global const real4 *support, uint origin, QP_NAME(surface_point) * s) {
@@ -54,18 +62,27 @@ QP_FUNCTION void QP_NAME(eval_crease)(__global const real4 *support, __global co
 #endif
 
 #if QP_WITH_TERMINAL
+/* One row of points from number `slot` on. */
+QP_FUNCTION void QP_NAME(add_slots)(__global const real4 *support, __global const uint *ring, uint slot,
+                                    int first, const real bu[4], const real du[4], real bv, real dv,
+                                    QP_NAME(surface_point) * s) {
+    QP_NAME(add_row)
+    (s, first, QP_POINT(ring, slot), QP_POINT(ring, slot + 1u), QP_POINT(ring, slot + 2u),
+     QP_POINT(ring, slot + 3u), bu, du, bv, dv);
+}
+
 /* One of the three regular sub-domains of a terminal node's ring level: (u,v) with u >= 1/2 or v >= 1/2. */
 QP_FUNCTION void QP_NAME(eval_ring)(__global const real4 *support, __global const uint *ring, uint origin,
                                     real u, real v, QP_NAME(surface_point) * s) {
     real bu[4], du[4], bv[4], dv[4];
     const uint cx = u >= QP_R(0.5), cy = v >= QP_R(0.5);
-    uint slot = 5u * cy + cx - 1u;
+    const uint slot = 5u * cy + cx - 1u;
     QP_NAME(basis)(QP_R(2.0) * u - (real)cx, bu, du);
     QP_NAME(basis)(QP_R(2.0) * v - (real)cy, bv, dv);
-    for (uint j = 0; j < 4u; ++j, slot += 5u)
-        QP_NAME(add_row)
-        (s, j == 0, QP_POINT(ring, slot), QP_POINT(ring, slot + 1u), QP_POINT(ring, slot + 2u),
-         QP_POINT(ring, slot + 3u), bu, du, bv[j], dv[j]);
+    QP_NAME(add_slots)(support, ring, slot, 1, bu, du, bv[0], dv[0], s);
+    QP_NAME(add_slots)(support, ring, slot + 5u, 0, bu, du, bv[1], dv[1], s);
+    QP_NAME(add_slots)(support, ring, slot + 10u, 0, bu, du, bv[2], dv[2], s);
+    QP_NAME(add_slots)(support, ring, slot + 15u, 0, bu, du, bv[3], dv[3], s);
     QP_NAME(add_origin)(support, origin, s);
 }
 #endif
@@ -222,12 +239,39 @@ __kernel void QP_NAME(domain)(__global const uint *heads, __global const uint *t
     const uint rotation = entry[QP_ENTRY_ROTATION];
     const uint samples = entry[QP_ENTRY_SAMPLES];
 
-    for (uint i = (uint)get_local_id(0); i < samples; i += (uint)get_local_size(0)) {
-        QP_NAME(surface_point) s;
-        real u = us[i], v = vs[i];
-        QP_NAME(rotate_uv)(rotation, &u, &v);
-        QP_NAME(eval_tree)(tree, constants, points, u, v, &s);
-        const real4 n = QP_NAME(unit_normal)(s.du, s.dv, &s.flags);
-        QP_NAME(write_sample)(vertices, flags, out + i, add4(origin, s.p), n, s.flags);
+    /* Lanes past the last sample are not written: they keep an older sample, or two unit vectors to begin with. */
+    real value[9][QP_LANES];
+    uint flag[QP_LANES];
+    for (uint l = 0; l < QP_LANES; ++l) {
+        for (uint k = 0; k < 9u; ++k) value[k][l] = k == 3u || k == 7u;
+        flag[l] = 0;
+    }
+    const uint step = (uint)get_local_size(0) * QP_LANES;
+    for (uint i = (uint)get_local_id(0) * QP_LANES; i < samples; i += step) {
+        /* The tree is walked sample by sample, normals are made for QP_LANES samples at once. */
+        const uint block = samples - i < QP_LANES ? samples - i : QP_LANES;
+        for (uint l = 0; l < block; ++l) {
+            QP_NAME(surface_point) s;
+            real u = us[i + l], v = vs[i + l];
+            QP_NAME(rotate_uv)(rotation, &u, &v);
+            QP_NAME(eval_tree)(tree, constants, points, u, v, &s);
+            value[0][l] = s.p.x;
+            value[1][l] = s.p.y;
+            value[2][l] = s.p.z;
+            value[3][l] = s.du.x;
+            value[4][l] = s.du.y;
+            value[5][l] = s.du.z;
+            value[6][l] = s.dv.x;
+            value[7][l] = s.dv.y;
+            value[8][l] = s.dv.z;
+            flag[l] = s.flags;
+        }
+        lanes p[3], du[3], dv[3];
+        for (uint c = 0; c < 3u; ++c) {
+            p[c] = load_lanes(value[c]);
+            du[c] = load_lanes(value[3u + c]);
+            dv[c] = load_lanes(value[6u + c]);
+        }
+        QP_NAME(write_samples)(vertices, flags, out + i, block, origin, p, du, dv, flag);
     }
 }

@@ -34,7 +34,7 @@ __kernel void QP_NAME(regular)(__global const uint *rings, __global const real *
             u = rotation == 1u ? b : sub_lanes(one, rotation == 2u ? a : b);
             v = rotation == 3u ? a : sub_lanes(one, rotation == 1u ? a : b);
         }
-        lanes bu[4], du[4], bv[4], dv[4], p[3], su[3], sv[3], n[3];
+        lanes bu[4], du[4], bv[4], dv[4], p[3], su[3], sv[3];
         QP_NAME(basis_lanes)(u, bu, du);
         QP_NAME(basis_lanes)(v, bv, dv);
         for (uint c = 0; c < 3u; ++c) {
@@ -50,43 +50,9 @@ __kernel void QP_NAME(regular)(__global const uint *rings, __global const real *
                 sv[c] = j == 0 ? mul_lanes(along, dv[0]) : fma_lanes(along, dv[j], sv[c]);
             }
         }
-        /* unit_normal() for lanes. */
-        for (uint c = 0; c < 3u; ++c) {
-            const uint y = c == 2u ? 0u : c + 1u, z = c == 0u ? 2u : c - 1u;
-            const lanes cd = mul_lanes(su[z], sv[y]);
-            const lanes rest = fma_lanes(neg_lanes(su[z]), sv[y], cd);
-            n[c] = add_lanes(fma_lanes(su[y], sv[z], neg_lanes(cd)), rest);
-        }
-        const lanes length2 = fma_lanes(n[2], n[2], fma_lanes(n[1], n[1], mul_lanes(n[0], n[0])));
-        const lanes inverse = div_lanes(one, sqrt_lanes(length2));
-        real result[6][QP_LANES];
-        uchar flag[QP_LANES];
-        store_lanes(add_lanes(splat(origin.x), p[0]), result[0]);
-        store_lanes(add_lanes(splat(origin.y), p[1]), result[1]);
-        store_lanes(add_lanes(splat(origin.z), p[2]), result[2]);
-        for (uint c = 0; c < 3u; ++c) store_lanes(mul_lanes(n[c], inverse), result[3u + c]);
+        uint flag[QP_LANES];
         for (uint l = 0; l < QP_LANES; ++l) flag[l] = 0;
-        if (!lanes_within(length2, QP_TINY, QP_HUGE)) {
-            real slopes[6][QP_LANES];
-            for (uint c = 0; c < 3u; ++c) {
-                store_lanes(su[c], slopes[c]);
-                store_lanes(sv[c], slopes[3u + c]);
-            }
-            for (uint l = 0; l < QP_LANES; ++l) {
-                uint f = 0;
-                const real4 m = QP_NAME(unit_normal)(make4(slopes[0][l], slopes[1][l], slopes[2][l]),
-                                                     make4(slopes[3][l], slopes[4][l], slopes[5][l]), &f);
-                result[3][l] = m.x;
-                result[4][l] = m.y;
-                result[5][l] = m.z;
-                flag[l] = (uchar)f;
-            }
-        }
-        const uint block = samples - i < QP_LANES ? samples - i : QP_LANES;
-        for (uint l = 0; l < block; ++l) {
-            const real4 q = make4(result[0][l], result[1][l], result[2][l]);
-            const real4 m = make4(result[3][l], result[4][l], result[5][l]);
-            QP_NAME(write_sample)(vertices, flags, out + i + l, q, m, flag[l]);
-        }
+        QP_NAME(write_samples)
+        (vertices, flags, out + i, samples - i < QP_LANES ? samples - i : QP_LANES, origin, p, su, sv, flag);
     }
 }

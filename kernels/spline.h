@@ -114,15 +114,44 @@ QP_FUNCTION void QP_NAME(rotate_uv)(uint r, real *u, real *v) {
     }
 }
 
-/* Writes sample i: 6 reals and a byte of flags. */
-QP_FUNCTION void QP_NAME(write_sample)(__global real *vertices, __global uchar *flags, ulong i, real4 p,
-                                       real4 n, uint f) {
+/* Writes QP_LANES samples, or the first `block` of them, from sample i on: their positions relative to origin, their
+ * derivatives and flags. unit_normal() for lanes; those whose cross product is of no ordinary length go through
+ * unit_normal() itself. */
+QP_FUNCTION void QP_NAME(write_samples)(__global real *vertices, __global uchar *flags, ulong i, uint block,
+                                        real4 origin, const lanes p[3], const lanes du[3], const lanes dv[3],
+                                        uint flag[QP_LANES]) {
+    lanes n[3];
+    real result[6][QP_LANES];
+    for (uint c = 0; c < 3u; ++c) {
+        const uint y = c == 2u ? 0u : c + 1u, z = c == 0u ? 2u : c - 1u;
+        const lanes cd = mul_lanes(du[z], dv[y]);
+        const lanes rest = fma_lanes(neg_lanes(du[z]), dv[y], cd);
+        n[c] = add_lanes(fma_lanes(du[y], dv[z], neg_lanes(cd)), rest);
+    }
+    const lanes length2 = fma_lanes(n[2], n[2], fma_lanes(n[1], n[1], mul_lanes(n[0], n[0])));
+    const lanes inverse = div_lanes(splat(QP_R(1.0)), sqrt_lanes(length2));
+    store_lanes(add_lanes(splat(origin.x), p[0]), result[0]);
+    store_lanes(add_lanes(splat(origin.y), p[1]), result[1]);
+    store_lanes(add_lanes(splat(origin.z), p[2]), result[2]);
+    for (uint c = 0; c < 3u; ++c) store_lanes(mul_lanes(n[c], inverse), result[3u + c]);
+    if (!lanes_within(length2, QP_TINY, QP_HUGE)) {
+        real slopes[6][QP_LANES];
+        for (uint c = 0; c < 3u; ++c) {
+            store_lanes(du[c], slopes[c]);
+            store_lanes(dv[c], slopes[3u + c]);
+        }
+        for (uint l = 0; l < QP_LANES; ++l) {
+            const real4 m = QP_NAME(unit_normal)(make4(slopes[0][l], slopes[1][l], slopes[2][l]),
+                                                 make4(slopes[3][l], slopes[4][l], slopes[5][l]), &flag[l]);
+            result[3][l] = m.x;
+            result[4][l] = m.y;
+            result[5][l] = m.z;
+        }
+    }
     __global real *out = vertices + 6u * i;
-    out[0] = p.x;
-    out[1] = p.y;
-    out[2] = p.z;
-    out[3] = n.x;
-    out[4] = n.y;
-    out[5] = n.z;
-    flags[i] = (uchar)f;
+    __global uchar *out_flags = flags + i;
+    for (uint l = 0; l < block; ++l, out += 6) {
+        for (uint c = 0; c < 6u; ++c) out[c] = result[c][l];
+        out_flags[l] = (uchar)flag[l];
+    }
 }
