@@ -176,6 +176,11 @@ static void crease_limit(const sector *s, qp_corner_limit *limit) {
         add(across, unit * face * (sinl(i * theta) + sinl((i + 1) * theta)), s->f + 3 * (size_t)i);
     }
     span_plane(s, along, across, theta, limit);
+    /* From five faces on, the sector's second sine (angle 2 theta) decays more slowly than the 1/2 of the
+     * curve: normals inside turn toward the plane of the two sines, on the curve toward this one. No tangent
+     * plane, unless by chance. At four both are 1/2 and share a Jordan block: one plane, reached like 1 / level.
+     */
+    limit->has_plane = k <= 4;
 }
 
 static void corner_limit(const sector *s, qp_corner_limit *limit) {

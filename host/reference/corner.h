@@ -19,7 +19,8 @@ typedef struct qp_corner_limit {
     /* Tangents along the face's two edges at the vertex: toward the next vertex of the face and toward the
      * previous one. Where the surface is regular there, they are the derivatives by the parameter that runs
      * from 0 to 1 along that edge of the face; else only the plane they span and the sign of their cross
-     * product mean something. Zero where has_plane is false. */
+     * product mean something. Where has_plane is false they are zero, or the tangents of the curve and across
+     * it at a crease of five faces or more. */
     double toward_next[3], toward_prev[3];
     bool has_plane;
 } qp_corner_limit;

@@ -8,7 +8,7 @@
 typedef struct qp_reference_sample {
     /* du, dv with respect to the patch's own (u,v) in [0,1]^2. At a corner of an irregular cell they span the
      * tangent plane, and are the one-sided derivatives where those are finite and not zero, else tangents of
-     * any length; 0 where there is no tangent plane. */
+     * any length (often 0) where there is no tangent plane. */
     double p[3], du[3], dv[3];
     double n[3];         /* unit normal, or 0 where undefined */
     bool normal_defined; /* false where the surface has no tangent plane, or it is too ill-conditioned to tell
