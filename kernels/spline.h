@@ -151,7 +151,12 @@ QP_FUNCTION void QP_NAME(write_samples)(__global real *vertices, __global uchar 
     __global real *out = vertices + 6u * i;
     __global uchar *out_flags = flags + i;
     for (uint l = 0; l < block; ++l, out += 6) {
-        for (uint c = 0; c < 6u; ++c) out[c] = result[c][l];
+        out[0] = result[0][l];
+        out[1] = result[1][l];
+        out[2] = result[2][l];
+        out[3] = result[3][l];
+        out[4] = result[4][l];
+        out[5] = result[5][l];
         out_flags[l] = (uchar)flag[l];
     }
 }

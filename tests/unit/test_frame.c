@@ -292,6 +292,33 @@ static void test_kernel_folder(qp_device *opencl, const qp_surface *surface) {
     unsetenv("QUADPLAN_KERNELS");
 }
 
+/* What a device could be instead: other register widths, float division that is not correctly rounded. The same
+ * bits. */
+static void test_variants(qp_device *opencl, const qp_surface *surface) {
+    const qp_tessellation tessellation = {.factor = 7};
+    if (opencl == NULL) return;
+    const qp_device kept = *opencl;
+    for (int p = QP_FLOAT; p <= QP_DOUBLE; ++p) {
+        if (p == QP_DOUBLE && !qp_device_has_double(opencl)) continue;
+        result usual = run(opencl, surface, (qp_precision)p, 0, &tessellation);
+        for (uint32_t lanes = 1; lanes <= 16; lanes = lanes == 1 ? 4 : 2 * lanes) {
+            for (int correct = 0; correct < 2; ++correct) {
+                opencl->lanes_float = lanes;
+                opencl->lanes_double = lanes;
+                opencl->info.rounds_correctly = correct && kept.info.rounds_correctly;
+                check_same(usual, run(opencl, surface, (qp_precision)p, 0, &tessellation));
+                opencl->info.rounds_correctly = kept.info.rounds_correctly;
+            }
+        }
+        opencl->lanes_float = kept.lanes_float;
+        opencl->lanes_double = kept.lanes_double;
+        /* Work-groups of the size that other devices than processors get. */
+        opencl->info.is_cpu = false;
+        check_same(usual, run(opencl, surface, (qp_precision)p, 0, &tessellation));
+        opencl->info.is_cpu = kept.info.is_cpu;
+    }
+}
+
 static void test_mesh(qp_device *host, qp_device *opencl, const generated *g) {
     qp_error err = {0};
     qp_mesh *mesh = NULL;
@@ -319,8 +346,10 @@ int main(void) {
     qp_surface *surface = NULL;
     qp_generate_options options = {.sharpness = -1};
     if (CHECK_OK(qp_mesh_generate("creased-torus", &options, &mesh, &err), err) &&
-        CHECK_OK(qp_surface_create(mesh, NULL, &surface, &err), err))
+        CHECK_OK(qp_surface_create(mesh, NULL, &surface, &err), err)) {
         test_kernel_folder(opencl, surface);
+        test_variants(opencl, surface);
+    }
     qp_surface_free(surface);
     qp_mesh_free(mesh);
     qp_device_free(host);
