@@ -14,7 +14,7 @@ static const float kind_colours[8][3] = {
 
 static void of_hue(double hue, double saturation, double value, float colour[3]) {
     for (int k = 0; k < 3; k++) {
-        double x = fmod(hue * 6 + (k == 0 ? 0 : k == 1 ? 4 : 2), 6);
+        double x = fmod(hue * 6 + (5 - 2 * k), 6);
         double rise = fmin(fmax(fmin(x, 4 - x), 0), 1); /* the channel drops out around its opposite hue */
         colour[k] = (float)(value * (1 - saturation * rise));
     }

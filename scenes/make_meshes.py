@@ -115,11 +115,13 @@ def urn():
     """Fluted body, creased foot and lip, a 16-gon below, a pole of valence 16 inside, two handles."""
     n = 16
     profile = [(0.52, 0.0, 4, 0), (0.55, 0.06, 2.5, 0), (0.42, 0.14, 0, 0), (0.22, 0.26, 0, 0), (0.25, 0.36, 3, 0),
-               (0.40, 0.46, 0, 0.05), (0.74, 0.80, 0, 0.06), (0.86, 1.20, 0, 0.06), (0.76, 1.54, 0, 0.05),
+               (0.40, 0.46, 0, 0.07), (0.74, 0.80, 0, 0.08), (0.86, 1.20, 0, 0.08), (0.76, 1.54, 0, 0.07),
                (0.46, 1.78, 2.2, 0), (0.37, 1.94, 0, 0), (0.40, 2.12, 0, 0), (0.62, 2.26, 2, 0),
                (0.63, 2.33, 2.6, 0), (0.52, 2.30, 0, 0), (0.34, 2.12, 0, 0), (0.31, 1.86, 0, 0), (0.62, 1.45, 0, 0),
                (0.62, 0.95, 0, 0), (0.3, 0.62, 0, 0)]
     mesh, loops = revolve(profile, n, close_bottom="ngon", close_top=0.55)
+    for k in range(0, n, 2):  # the flutes' valleys
+        mesh.crease_loop([loops[j][k] for j in range(5, 10)], 1.4, closed=False)
     for side in (0, n // 2):
         k = side + n // 4
         # The quads of the neck and of the shoulder on this side make room for the handle's ends.
@@ -131,8 +133,7 @@ def urn():
         way = []
         for radius, height, lean in ((1.08, 1.42, 0.45), (1.19, 1.62, 0.0), (1.12, 1.92, -0.4), (0.86, 2.08, -1.2),
                                      (0.6, 2.06, -1.6)):
-            # `along` turns from up at the shoulder, over outward-down at the top, to down at the neck.
-            along = (-out[0] * math.sin(-lean), math.cos(lean), -out[2] * math.sin(-lean))
+            # `along` turns from up at the shoulder to down at the neck.
             turned = math.pi / 2 - lean
             along = (-out[0] * math.sin(turned), math.cos(turned), -out[2] * math.sin(turned))
             way.append(([radius * out[0], height, radius * out[2]], across, along, 0.085))
@@ -302,10 +303,10 @@ def staircase(steps=10):
     left, right = [], []
     outline = []
     for k in range(steps):
-        outline.append((k, k * 0.6, 0.5 + k - 0.5))
-        outline.append((k, (k + 1) * 0.6, 0.5 + k - 0.5))
-    outline.append((steps, steps * 0.6, steps - 0.5))
-    for x, y, _ in outline:
+        outline.append((k, k * 0.6))
+        outline.append((k, (k + 1) * 0.6))
+    outline.append((steps, steps * 0.6))
+    for x, y in outline:
         left.append(mesh.point(x, y, 0))
         right.append(mesh.point(x, y, 3))
     for k in range(len(outline) - 1):
@@ -315,23 +316,10 @@ def staircase(steps=10):
     return mesh
 
 
-def patchwork(holes):
-    """A wavy open sheet with holes, for the three boundary rules."""
-    mesh = Mesh()
-    n = 6
-    grid = [[mesh.point(x, 0.35 * math.sin(1.3 * x) * math.cos(1.1 * z), z) for z in range(n + 1)] for x in range(n + 1)]
-    for x in range(n):
-        for z in range(n):
-            f = mesh.face(grid[x][z], grid[x][z + 1], grid[x + 1][z + 1], grid[x + 1][z])
-            if (x, z) in holes:
-                mesh.holes.append(f)
-    return mesh
-
-
 def boundaries():
     mesh = Mesh()
     rng = random.Random(5)
-    n = 7
+    n = 9
     grid = {}
     for x in range(n + 1):
         for z in range(n + 1):
@@ -339,7 +327,7 @@ def boundaries():
                                       0.5 * math.sin(0.9 * x) * math.cos(0.8 * z) + 0.8, z - n / 2)
     for x in range(n):
         for z in range(n):
-            if (x, z) in ((2, 2), (2, 3), (3, 2), (5, 5), (0, 6), (6, 0)):
+            if (x, z) in ((2, 2), (2, 3), (3, 2), (7, 6), (0, 8), (8, 0)):
                 continue
             mesh.face(grid[(x, z)], grid[(x, z + 1)], grid[(x + 1, z + 1)], grid[(x + 1, z)])
     used = sorted({v for f in mesh.faces for v in f})
