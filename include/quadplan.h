@@ -119,9 +119,13 @@ QP_API const double *qp_mesh_positions(const qp_mesh *mesh);
 /* ---- Surfaces: patches and their subdivision plans
  * --------------------------------------------------------- */
 
+/* (u,v) are multiples of 2^-24. Plans of this depth end at single points of that grid, so no sample lies below them. */
+#define QP_DEPTH_LIMIT 24
+
 /* Zero-initialise for the defaults. */
 typedef struct qp_surface_options {
-    uint32_t depth; /* deepest subdivision level a plan stores, 1..12; 0: 10. The paper's is 6 (factor 64). */
+    uint32_t
+        depth; /* deepest subdivision level a plan stores, 1..QP_DEPTH_LIMIT; 0: 10. The paper's is 6 (factor 64). */
     int no_crease_nodes;   /* subdivide along single semi-sharp creases instead (for comparison) */
     int no_terminal_nodes; /* internal nodes instead of terminal ones (for comparison) */
 } qp_surface_options;

@@ -12,6 +12,7 @@ enum { QP_POINT_REFINED, QP_POINT_LIMIT, QP_POINT_TANGENT };
 /* Scratch of one worker, reused from plan to plan. Zero-initialise. */
 typedef struct qp_builder {
     qp_local local;
+    qp_local tail; /* of the terminal chain at hand */
     uint32_t depth;
     bool crease_nodes, terminal_nodes;
     uint32_t base; /* level of the patch: 0 for a quad, 1 for an n-gon's child */

@@ -19,9 +19,9 @@ typedef struct qp_fan {
     float sharpness; /* of the vertex */
     uint32_t faces;  /* m */
     bool closed;
-    uint32_t *spoke;  /* [spokes] far points */
-    float *sharp;     /* [spokes] sharpness of the spoke edges */
-    float *far_sharp; /* [spokes] sharpness that the far half of the spoke gets at the next level */
+    uint32_t *spoke;    /* [spokes] far points */
+    float *sharp;       /* [spokes] sharpness of the spoke edges */
+    float *far_sharp;   /* [spokes] sharpness that the far half of the spoke gets at the next level */
     uint32_t *diagonal; /* [m] the fourth point of quad j; QP_NONE where the face is no quad (level 0 only) */
     uint32_t *face;     /* [m] index into qp_local.faces at level 0; NULL above */
 } qp_fan;

@@ -240,8 +240,9 @@ qp_status qp_surface_create(const qp_mesh *mesh, const qp_surface_options *optio
     double begin = qp_now_ms();
     qp_surface_options chosen = options != NULL ? *options : (qp_surface_options){0};
     if (chosen.depth == 0) chosen.depth = 10;
-    if (chosen.depth > 12) {
-        return qp_fail(err, QP_BAD_INPUT, "depth %u is out of range (1 to 12)", (unsigned)chosen.depth);
+    if (chosen.depth > QP_DEPTH_LIMIT) {
+        return qp_fail(err, QP_BAD_INPUT, "depth %u is out of range (1 to %d)", (unsigned)chosen.depth,
+                       QP_DEPTH_LIMIT);
     }
     qp_surface *s = qp_alloc(1, sizeof *s, true);
     if (s == NULL) return qp_fail_memory(err, sizeof *s, "a surface");

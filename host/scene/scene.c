@@ -66,7 +66,7 @@ static const qp_field subdivision_fields[] = {
      .offset = AT(mesh_options.triangle_rule),
      .names = triangle_names,
      .given = GIVEN_TRIANGLES},
-    {.key = "depth", .kind = QP_FIELD_COUNT, .offset = AT(surface_options.depth), .low = 1, .high = 12},
+    {.key = "depth", .kind = QP_FIELD_COUNT, .offset = AT(surface_options.depth), .low = 1, .high = QP_DEPTH_LIMIT},
     {0}};
 
 static const qp_field random_fields[] = {
