@@ -23,8 +23,8 @@ typedef struct cli_evaluation_options {
      CLI_CHOICE, &(o).spacing, 0, 0, NULL},                                                                  \
     {"--precision", CLI_PRECISIONS, "of stencils and kernels (default float)",                               \
      CLI_CHOICE, &(o).precision, 0, 0, NULL},                                                                \
-    {"--depth", "N", "deepest subdivision level of the plans, 1 to 12 (default 10)",                         \
-     CLI_COUNT, &(o).depth, 1, 12, NULL},                                                                    \
+    {"--depth", "N", "deepest subdivision level of the plans, 1 to 24 (default 10)",                         \
+     CLI_COUNT, &(o).depth, 1, QP_DEPTH_LIMIT, NULL},                                                                    \
     {"--device", "D", "host, P.D, or part of a name, as `quadplan devices` lists them",                      \
      CLI_TEXT, &(o).device, 0, 0, NULL},                                                                     \
     {"--no-regular-pass", NULL, "evaluate regular patches by the general kernels, for comparison",           \
