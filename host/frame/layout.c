@@ -343,8 +343,10 @@ qp_status qp_layout_points(const qp_surface *surface, uint64_t count, const uint
         qp_layout_free(layout);
         return status;
     }
-    memcpy(layout->uv, uv, (size_t)count * 2 * sizeof(float));
-    memcpy(layout->sample_patch, patch, (size_t)count * sizeof(uint32_t));
+    if (count != 0) { /* the caller's arrays may be NULL */
+        memcpy(layout->uv, uv, (size_t)count * 2 * sizeof(float));
+        memcpy(layout->sample_patch, patch, (size_t)count * sizeof(uint32_t));
+    }
     for (uint64_t i = 0; i < count; ++i) ++first[patch[i] + 2];
     for (uint32_t p = 0; p < n_patches; ++p) first[p + 1] += first[p];
     bool sorted = true;
