@@ -31,7 +31,7 @@ static qp_gl_function find(const char *name) {
 static void close_egl(qp_gl_platform *platform) {
     egl.make_current(platform->display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
     egl.destroy_context(platform->display, platform->context);
-    egl.terminate(platform->display);
+    /* The display stays, for the next context: terminating it would unload the driver, which leaks. */
 }
 
 static bool load_all(void *library) {
