@@ -42,6 +42,7 @@ qp_leaf qp_classify(const qp_plan *plan, float u, float v) {
                 if (u >= 0.5f || v >= 0.5f) return (qp_leaf){QP_NODE_TERMINAL, level};
                 u *= 2, v *= 2;
             }
+            qp_rotate_uv(4 - QP_NODE_ROTATION(words[0]), &u, &v); /* back into the frame it was entered in */
             node = words[2];
         } else {
             return (qp_leaf){kind, level};
