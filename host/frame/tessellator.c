@@ -3,12 +3,14 @@
  * What a GPU does here is fixed by the Direct3D 11.3 functional specification (chapter "Tessellator"), which
  * GL implementations follow: coordinates in 16.16 fixed point, each edge laid out symmetrically about its
  * middle, points added in the order of a ruler function as a factor grows, and the interior as concentric
- * rings, the outermost of which is stitched to the four edges. Names here:
+ * rings, the outermost of which is stitched to the four edges. Where the specification leaves details open (which point
+ * splits, how odd and even rows are stitched, which way a diagonal runs) this follows the behaviour of Microsoft's
+ * reference tessellator (MIT licence), which Mesa's software drivers contain. Names here:
  *
  *   axis     one edge or one inner direction: its factor, parity and how its points lie in [0,1]
- *   lattice  the inner axes' grid; point (i,j), 1 <= i <= count_u - 2, belongs to ring min distance to the
- * rim row      the points along one side of a ring, in the direction in which rings are walked: down u=0,
- * along v=0, up u=1, back along v=1
+ *   lattice  the inner axes' grid; point (i,j), 1 <= i <= count_u - 2, belongs to ring min distance to the rim
+ *   row      the points along one side of a ring, in the direction in which rings are walked: down u=0, along
+ *            v=0, up u=1, back along v=1
  */
 #include "host/frame/tessellator.h"
 
