@@ -101,17 +101,9 @@ QP_FUNCTION real4 QP_NAME(unit_normal)(real4 du, real4 dv, uint *flags) {
 
 /* Turns (u,v) by rotation r, see plan_layout.h; exact, since u and v are multiples of 2^-24. */
 QP_FUNCTION void QP_NAME(rotate_uv)(uint r, real *u, real *v) {
-    real a = *u, b = *v;
-    if (r == 1u) {
-        *u = b;
-        *v = QP_R(1.0) - a;
-    } else if (r == 2u) {
-        *u = QP_R(1.0) - a;
-        *v = QP_R(1.0) - b;
-    } else if (r == 3u) {
-        *u = QP_R(1.0) - b;
-        *v = a;
-    }
+    const real x = (r & 1u) != 0 ? *v : *u, y = (r & 1u) != 0 ? *u : *v;
+    *u = (r & 2u) != 0 ? QP_R(1.0) - x : x;
+    *v = ((r + 1u) & 2u) != 0 ? QP_R(1.0) - y : y;
 }
 
 /* Writes QP_LANES samples, or the first `block` of them, from sample i on: their positions relative to origin, their
