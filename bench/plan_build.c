@@ -7,6 +7,7 @@
  * use one thread. Medians are printed. Then a regular mesh of a million faces: its plans must not grow with
  * it. */
 #define _GNU_SOURCE
+#include "host/base/median.h"
 #include "host/mesh/mesh.h"
 #include "host/peer/osd.h"
 
@@ -16,16 +17,6 @@
 #include <string.h>
 
 enum { LEVEL = 6, MOST_REPEATS = 100 };
-
-static int compare_doubles(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-static double median(double *values, unsigned count) {
-    qsort(values, count, sizeof *values, compare_doubles);
-    return count % 2 == 1 ? values[count / 2] : 0.5 * (values[count / 2 - 1] + values[count / 2]);
-}
 
 /* Milliseconds of qp_surface_create, analysis of the mesh apart. threads: NULL for all. */
 static qp_status time_plans(const qp_mesh *mesh, uint32_t depth, const char *threads, double *ms,
@@ -61,13 +52,14 @@ static qp_status beside_opensubdiv(const char *path, unsigned repeats, qp_error 
     qp_mesh_free(mesh);
     if (status != QP_OK) return status;
     const char *slash = strrchr(path, '/');
-    double ours = median(one, repeats), ours_all = median(all, repeats), theirs = median(peer, repeats);
+    double ours = qp_median(one, repeats), ours_all = qp_median(all, repeats),
+           theirs = qp_median(peer, repeats);
     printf("%s: %" PRIu64 " plans, %" PRIu64 " stencils, level %d, medians of %u\n",
            slash != NULL ? slash + 1 : path, info.plans, info.stencils, LEVEL, repeats);
     printf("  plans, 1 thread      %9.2f ms\n", ours);
     printf("  plans, %u threads     %9.2f ms\n", qp_thread_count(), ours_all);
     printf("  OpenSubdiv, 1 thread %9.2f ms (refine %.2f, patch table %.2f, stencil table %.2f)\n", theirs,
-           median(refine, repeats), median(patches, repeats), median(stencils, repeats));
+           qp_median(refine, repeats), qp_median(patches, repeats), qp_median(stencils, repeats));
     printf("  OpenSubdiv / plans   %9.2f (1 thread), %.2f (all)\n", theirs / ours, theirs / ours_all);
     return QP_OK;
 }

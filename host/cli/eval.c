@@ -1,4 +1,5 @@
 /* quadplan eval: the vertex stream, to a file and timed. */
+#include "host/base/median.h"
 #include "host/cli/evaluation.h"
 
 #include <inttypes.h>
@@ -13,18 +14,6 @@ typedef struct timings {
     double hull[MOST_REPEATS], domain[MOST_REPEATS], frame[MOST_REPEATS], fill[MOST_REPEATS];
     uint64_t peak_support_bytes;
 } timings;
-
-static int compare_doubles(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-static double median(const double *values, uint64_t count) {
-    double sorted[MOST_REPEATS];
-    memcpy(sorted, values, count * sizeof *values);
-    qsort(sorted, count, sizeof *sorted, compare_doubles);
-    return count % 2 == 1 ? sorted[count / 2] : 0.5 * (sorted[count / 2 - 1] + sorted[count / 2]);
-}
 
 static void fill_part(void *context, size_t begin, size_t end, unsigned worker) {
     memset((unsigned char *)context + begin, (int)(worker & 255), end - begin);
@@ -66,8 +55,8 @@ static qp_status measure(const cli_evaluation *evaluation, const qp_tessellation
 }
 
 static void print_result(bool as_json, const char *name, const cli_evaluation *evaluation,
-                         const cli_evaluation_options *options, const timings *t, const qp_stream *s) {
-    double frame_ms = median(t->frame, t->count), fill_ms = median(t->fill, t->count);
+                         const cli_evaluation_options *options, timings *t, const qp_stream *s) {
+    double frame_ms = qp_median(t->frame, t->count), fill_ms = qp_median(t->fill, t->count);
     double rate = frame_ms > 0 ? (double)s->n_samples / frame_ms * 1e3 : 0;
     double ratio = frame_ms > 0 ? fill_ms / frame_ms : 0;
     static const char *const spacings[] = {"equal", "fractional_even", "fractional_odd"};
@@ -76,7 +65,7 @@ static void print_result(bool as_json, const char *name, const cli_evaluation *e
         printf("  %" PRIu32 " patches, %" PRIu64 " samples, %" PRIu64 " triangles\n",
                evaluation->mesh->n_patches, s->n_samples, s->n_triangles);
         printf("  frame %.3f ms (hull %.3f, domain %.3f), median of %" PRIu64 "\n", frame_ms,
-               median(t->hull, t->count), median(t->domain, t->count), t->count);
+               qp_median(t->hull, t->count), qp_median(t->domain, t->count), t->count);
         printf("  %.2f million samples a second, %.4f of the speed of memset\n", rate * 1e-6, ratio);
         printf("  control points %" PRIu64 " bytes, stream hash %016" PRIx64 "\n", t->peak_support_bytes,
                s->hash);
@@ -94,8 +83,8 @@ static void print_result(bool as_json, const char *name, const cli_evaluation *e
     qp_json_integer(&json, "samples", s->n_samples);
     qp_json_integer(&json, "triangles", s->n_triangles);
     qp_json_integer(&json, "repeat", t->count);
-    qp_json_real(&json, "hull_ms", median(t->hull, t->count));
-    qp_json_real(&json, "domain_ms", median(t->domain, t->count));
+    qp_json_real(&json, "hull_ms", qp_median(t->hull, t->count));
+    qp_json_real(&json, "domain_ms", qp_median(t->domain, t->count));
     qp_json_real(&json, "frame_ms", frame_ms);
     qp_json_real(&json, "memset_ms", fill_ms);
     qp_json_real(&json, "samples_per_second", rate);
