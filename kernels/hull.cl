@@ -4,10 +4,15 @@
  *
  * for the entry's first `rows` points i, 4 reals a point (x, y, z, 0). Each work-item takes blocks of
  * QP_LANES neighbouring points, whose weights lie side by side. The ring goes through local memory in chunks,
- * for it may be of any size; sums run in ring order whatever the chunk or block, so that neither changes a
- * bit. */
+ * for it may be of any size. Sums run in ring order, in parts of QP_HULL_PART vertices that start at 0 and are then added up:
+ * the error of a sum of n terms grows with n/part + part instead of n, which counts at valences in the thousands. Chunks are
+ * whole parts, so that neither their size nor that of a block changes a bit. */
+#define QP_HULL_PART 32u
 #ifndef QP_HULL_CHUNK
 #define QP_HULL_CHUNK 128u
+#endif
+#if QP_HULL_CHUNK % QP_HULL_PART != 0
+#error "a chunk is to be whole parts"
 #endif
 
 __kernel void QP_NAME(hull)(__global const uint *heads, __global const real *reals,
@@ -56,11 +61,18 @@ __kernel void QP_NAME(hull)(__global const uint *heads, __global const real *rea
             }
             /* Reads up to QP_LANES - 1 weights past the row: the next row's, or the padding of the buffer. */
             __global const real *weight = weights + begin * points + i;
-            for (uint j = 0; j < count; ++j, weight += points) {
-                const lanes w = load_lanes(weight);
-                x = fma_lanes(w, splat(ring_x[j]), x);
-                y = fma_lanes(w, splat(ring_y[j]), y);
-                z = fma_lanes(w, splat(ring_z[j]), z);
+            for (uint part = 0; part < count; part += QP_HULL_PART) {
+                const uint end = count - part < QP_HULL_PART ? count : part + QP_HULL_PART;
+                lanes px = splat(QP_R(0.0)), py = px, pz = px;
+                for (uint j = part; j < end; ++j, weight += points) {
+                    const lanes w = load_lanes(weight);
+                    px = fma_lanes(w, splat(ring_x[j]), px);
+                    py = fma_lanes(w, splat(ring_y[j]), py);
+                    pz = fma_lanes(w, splat(ring_z[j]), pz);
+                }
+                x = add_lanes(x, px);
+                y = add_lanes(y, py);
+                z = add_lanes(z, pz);
             }
             store_lanes(x, spill[0]);
             store_lanes(y, spill[1]);
