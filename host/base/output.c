@@ -7,12 +7,13 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-char *qp_output_temporary(const char *path) {
+/* A name beside path; free() it. NULL when memory is out. */
+static char *temporary_name(const char *path) {
     const char *slash = strrchr(path, '/');
     const char *name = slash != NULL ? slash + 1 : path;
     size_t size = strlen(path) + 40;
     char *text = qp_alloc(size, 1, false);
-    /* The process id keeps two runs apart; the extension stays last, as image writers choose by it. */
+    /* The process id keeps two runs apart. */
     if (text != NULL) snprintf(text, size, "%.*s.%ld~%s", (int)(name - path), path, (long)getpid(), name);
     return text;
 }
@@ -30,7 +31,7 @@ static bool written_in_place(const char *path) {
 }
 
 qp_status qp_output_open(qp_output *output, const char *path, qp_error *err) {
-    *output = (qp_output){.path = strdup(path), .temporary = qp_output_temporary(path)};
+    *output = (qp_output){.path = strdup(path), .temporary = temporary_name(path)};
     if (output->path == NULL || output->temporary == NULL) {
         output_free(output);
         return qp_fail_memory(err, strlen(path), "a file name");

@@ -10,12 +10,8 @@
 typedef struct qp_output {
     FILE *file;
     char *path;
-    char *temporary; /* in the same folder, with the same extension; NULL when written in place */
+    char *temporary; /* in the same folder; NULL when written in place */
 } qp_output;
-
-/* A name beside path, of the same extension, for what cannot write through a FILE; free() it. NULL when
- * memory is out. */
-char *qp_output_temporary(const char *path);
 
 /* Opens the temporary file. QP_SYSTEM, naming path, when it cannot be made. */
 qp_status qp_output_open(qp_output *output, const char *path, qp_error *err);

@@ -7,8 +7,10 @@
 #include "host/scene/image.h"
 
 typedef struct qp_image_codec {
-    /* Writes the form that png asks for to `file`; path is for messages. */
-    qp_status (*write)(const char *path, const char *file, const qp_image *image, bool png, qp_error *err);
+    /* The file that holds the form which png asks for, in memory for the caller to free(); path is for messages.
+     * In memory, because OpenImageIO's PNG writer does not notice a full disk. */
+    qp_status (*encode)(const char *path, const qp_image *image, bool png, void **bytes, size_t *size,
+                        qp_error *err);
     /* As qp_image_read, into a zeroed image. */
     qp_status (*read)(const char *path, qp_image *image, bool png, qp_error *err);
 } qp_image_codec;

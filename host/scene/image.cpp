@@ -3,9 +3,11 @@ extern "C" {
 #include "host/scene/codec.h"
 }
 
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
 #include <cstdlib>
+#include <cstring>
 #include <exception>
 #include <string>
 
@@ -17,8 +19,9 @@ std::string message() {
     return text.substr(0, text.find('\n'));
 }
 
-qp_status write_to(const char *path, const char *file, const qp_image *image, bool png, qp_error *err) {
-    auto output = OIIO::ImageOutput::create(file);
+qp_status encode(const char *path, const qp_image *image, bool png, void **bytes, std::size_t *size,
+                 qp_error *err) {
+    auto output = OIIO::ImageOutput::create(png ? "png" : "openexr");
     if (!output) return qp_fail(err, QP_SYSTEM, "%s: %s", path, message().c_str());
     OIIO::TypeDesc type = png ? OIIO::TypeDesc::UINT8 : OIIO::TypeDesc::FLOAT;
     OIIO::ImageSpec spec(static_cast<int>(image->width), static_cast<int>(image->height), 4, type);
@@ -26,13 +29,21 @@ qp_status write_to(const char *path, const char *file, const qp_image *image, bo
         spec.attribute("oiio:UnassociatedAlpha", 1);
     else
         spec.attribute("compression", "zip");
+    OIIO::Filesystem::IOVecOutput memory;
     const void *pixels = png ? static_cast<const void *>(image->rgba) : image->rgba_f;
-    bool good = output->open(file, spec) && output->write_image(type, pixels);
+    bool good = output->set_ioproxy(&memory) && output->open(png ? "x.png" : "x.exr", spec) &&
+                output->write_image(type, pixels);
     good = output->close() && good;
-    if (good) return QP_OK;
-    std::string text = output->geterror();
-    return qp_fail(err, QP_SYSTEM, "%s: cannot be written: %s", path,
-                   text.substr(0, text.find('\n')).c_str());
+    if (!good) {
+        std::string text = output->geterror();
+        return qp_fail(err, QP_SYSTEM, "%s: cannot be written: %s", path,
+                       text.substr(0, text.find('\n')).c_str());
+    }
+    *size = memory.buffer().size();
+    *bytes = qp_alloc(*size, 1, false);
+    if (*bytes == nullptr) return qp_fail_memory(err, *size, "a picture file");
+    std::memcpy(*bytes, memory.buffer().data(), *size);
+    return QP_OK;
 }
 
 /* Spreads n channels in the first places of each pixel over four. */
@@ -83,9 +94,10 @@ qp_status read_from(const char *path, qp_image *image, bool png, qp_error *err) 
     return QP_OK;
 }
 
-qp_status guarded_write(const char *path, const char *file, const qp_image *image, bool png, qp_error *err) {
+qp_status guarded_encode(const char *path, const qp_image *image, bool png, void **bytes, std::size_t *size,
+                         qp_error *err) {
     try {
-        return write_to(path, file, image, png, err);
+        return encode(path, image, png, bytes, size, err);
     } catch (const std::exception &e) {
         return qp_fail(err, QP_SYSTEM, "%s: cannot be written: %s", path, e.what());
     }
@@ -102,4 +114,4 @@ qp_status guarded_read(const char *path, qp_image *image, bool png, qp_error *er
 } // namespace
 
 extern "C" QP_API const qp_image_codec qp_image_module;
-extern "C" const qp_image_codec qp_image_module = {guarded_write, guarded_read};
+extern "C" const qp_image_codec qp_image_module = {guarded_encode, guarded_read};

@@ -65,13 +65,17 @@ qp_status qp_image_write(const char *path, const qp_image *image, qp_error *err)
         return qp_fail(err, QP_BAD_INPUT, "%s: there are no pixels to write", path);
     status = get_codec(&c, err);
     if (status != QP_OK) return status;
-    char *temporary = qp_output_temporary(path);
-    if (temporary == NULL) return qp_fail_memory(err, strlen(path), "a file name");
-    status = c->write(path, temporary, image, png, err);
-    if (status == QP_OK && rename(temporary, path) != 0)
-        status = qp_fail(err, QP_SYSTEM, "%s: cannot be written: %s", path, strerror(errno));
-    if (status != QP_OK) unlink(temporary);
-    free(temporary);
+    void *bytes;
+    size_t size;
+    status = c->encode(path, image, png, &bytes, &size, err);
+    if (status != QP_OK) return status;
+    qp_output output;
+    status = qp_output_open(&output, path, err);
+    if (status == QP_OK) {
+        fwrite(bytes, 1, size, output.file);
+        status = qp_output_commit(&output, err);
+    }
+    free(bytes);
     return status;
 }
 

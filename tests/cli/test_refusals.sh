@@ -16,7 +16,7 @@ for number in nan inf 1e999 0 65 -1 "" 4x 0x10; do
 done
 refuses "bad spacing" 2 "none of equal" eval "$cube" --spacing odd
 refuses "bad repeat" 2 "whole number" eval "$cube" --repeat 1.5
-refuses "bad depth" 2 "whole number from 1 to 12" info "$cube" --depth 13
+refuses "bad depth" 2 "whole number from 1 to 24" info "$cube" --depth 25
 refuses "flag with a value" 2 "takes no value" info "$cube" --json=1
 refuses "unknown kind" 2 "icosahedron" gen icosahedron -o "$work/x.obj"
 refuses "unknown kind in a mesh argument" 2 "icosahedron" info gen:icosahedron
@@ -38,6 +38,15 @@ refuses "a face of two" 2 "two.obj:4: " info "$work/two.obj"
 refuses "empty file" 2 "empty.obj" info "$work/empty.obj"
 printf '{"mesh": ' >"$work/half.json"
 refuses "half a scene" 2 "half.json" render "$work/half.json" -o "$work/x.png"
+
+scene=$QUADPLAN_SOURCE_DIR/scenes/creased-torus.json
+refuses "render without -o" 2 "render needs -o" render "$scene"
+refuses "a size of one side" 2 "width and height" render "$scene" --size 64 -o "$work/x.png"
+refuses "an empty picture" 2 "width and height" render "$scene" --size 0x64 -o "$work/x.png"
+refuses "not a scene" 2 "README.md:1: " render "$QUADPLAN_SOURCE_DIR/README.md" -o "$work/x.png"
+QUADPLAN_GL=directx refuses "unknown GL" 2 "directx" render "$scene" --device host --size 8x8 -o "$work/x.png"
+refuses "picture in a missing folder" 3 "nowhere/x.png: " render "$scene" --device host --size 8x8 \
+    -o "$work/nowhere/x.png"
 
 refuses "no such device" 3 "nonesuch" eval "$cube" --device nonesuch
 export OCL_ICD_VENDORS=$work/no-vendors
@@ -63,6 +72,15 @@ before=$(find "$work" | sort)
     "$QUADPLAN_PROGRAM" eval "$cube" --device host --tess 64 -o "$work/kept.obj" >/dev/null 2>"$work/limited"
     echo $? >>"$work/limited"
 )
+(
+    ulimit -f 1
+    trap '' XFSZ
+    "$QUADPLAN_PROGRAM" render "$scene" --device host --size 200x200 -o "$work/x.png" >/dev/null 2>"$work/stderr"
+    echo $? >"$work/picture"
+)
+check "write error of a picture: exit 3" [ "$(cat "$work/picture")" -eq 3 ]
+check "write error of a picture: one line" one_line
+rm "$work/picture"
 check "write error: exit 3" [ "$(tail -n 1 "$work/limited")" -eq 3 ]
 check "write error: the old file is kept" cmp "$cube" "$work/kept.obj"
 rm "$work/limited"

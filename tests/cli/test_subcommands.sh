@@ -93,6 +93,31 @@ check "error above a threshold: exit 1" [ "$code" -eq 1 ]
 check "error above a threshold: one line" one_line
 keys "error above a threshold" position_max
 
+scene=$QUADPLAN_SOURCE_DIR/scenes/creased-torus.json
+run render "$scene" --size 96x64 --tess 4 --json -o "$work/picture.png"
+check "render" [ "$code" -eq 0 ]
+keys render scene picture width height patches samples triangles frame_ms stream_hash device gl
+value 'o["width"] == 96 and o["height"] == 64'
+check "render: a PNG of that size, not of one colour" python3 -c '
+import struct, sys, zlib
+data = open(sys.argv[1], "rb").read()
+assert data[:8] == b"\x89PNG\r\n\x1a\n" and struct.unpack(">II", data[16:24]) == (96, 64)
+at, pixels = 8, b""
+while at < len(data):
+    length, kind = struct.unpack(">I4s", data[at:at + 8])
+    if kind == b"IDAT": pixels += data[at + 8:at + 8 + length]
+    at += 12 + length
+assert len(set(zlib.decompress(pixels))) > 50' "$work/picture.png"
+cp "$work/stdout" "$work/opencl.json"
+run render "$scene" --size 96x64 --tess 4 --json --device host -o "$work/host.png"
+check "render: host and device, the same bits" python3 -c '
+import json, sys
+a, b = (json.load(open(f))["stream_hash"] for f in sys.argv[1:])
+sys.exit(a != b)' "$work/opencl.json" "$work/stdout"
+check "render: host and device, the same picture" cmp "$work/picture.png" "$work/host.png"
+run render "$scene" --size 96x64 --tess 4 --color kind --wireframe -o "$work/kind.exr"
+check "render to exr" [ "$(head -c 4 "$work/kind.exr" | od -An -tx1 | tr -d ' ')" = 762f3101 ]
+
 run devices --json
 check "devices" [ "$code" -eq 0 ]
 value 'any(d["id"] == "host" for d in o["devices"])'
