@@ -8,14 +8,6 @@
 
 #include <string.h>
 
-/* Under a sanitizer quadruple precision is some ten times as slow, and what counts is that every line runs: fewer samples, and
- * the kernels as C on the host. */
-#if defined(__SANITIZE_ADDRESS__)
-enum { MEASURE_SANITIZED = 1 };
-#else
-enum { MEASURE_SANITIZED = 0 };
-#endif
-
 /* set: "grid" at factor and spacing of *tessellation, or one that qp_sample_set_make knows. */
 static inline int measure(const qp_surface *surface, qp_device *device, qp_precision precision,
                           const char *set, const qp_tessellation *tessellation, uint64_t samples,

@@ -21,13 +21,13 @@ static void visit(const char *name, qp_mesh *mesh) {
     qp_error err = {0};
     qp_surface *surface = NULL;
     if (!CHECK_OK(qp_surface_create(mesh, NULL, &surface, &err), err)) return;
-    qp_tessellation tessellation = {.spacing = QP_EQUAL, .factor = MEASURE_SANITIZED ? 2.0f : 16.0f};
+    qp_tessellation tessellation = {.spacing = QP_EQUAL, .factor = CHECK_SANITIZED ? 2.0f : 16.0f};
     for (int precision = 0; precision <= qp_device_has_double(device); ++precision) {
         for (int random = 0; random < 2; ++random) {
             qp_error_report r = {0};
             const char *set = random ? "random" : "grid";
             if (!measure(surface, device, (qp_precision)precision, set, &tessellation,
-                         MEASURE_SANITIZED ? 300 : 20000, 1, &r))
+                         CHECK_SANITIZED ? 300 : 20000, 1, &r))
                 continue;
             measure_add(&sums[precision], &r);
             if (within_bounds(&r, (qp_precision)precision)) continue;
@@ -45,8 +45,7 @@ int main(void) {
     const char *folder = check_models();
     if (folder == NULL) return check_skip_models();
     qp_error err = {0};
-    if (!CHECK_OK(qp_device_open(MEASURE_SANITIZED ? "host" : NULL, &device, &err), err))
-        return check_report();
+    if (!CHECK_OK(qp_device_open(CHECK_SANITIZED ? "host" : NULL, &device, &err), err)) return check_report();
     char shapes[1024];
     snprintf(shapes, sizeof shapes, "%s/osd_shapes", folder);
     unsigned refused = 0;

@@ -36,7 +36,7 @@ static void one_seed(qp_device *device, unsigned seed, bool full) {
 }
 
 int main(void) {
-    unsigned first = 0, last = MEASURE_SANITIZED ? 39 : 999;
+    unsigned first = 0, last = CHECK_SANITIZED ? 39 : 999;
     const char *seeds = getenv("QUADPLAN_SEEDS"), *full = getenv("QUADPLAN_FULL");
     if (seeds != NULL && sscanf(seeds, "%u-%u", &first, &last) != 2) {
         fprintf(stderr, "QUADPLAN_SEEDS is to be A-B\n");

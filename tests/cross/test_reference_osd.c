@@ -104,7 +104,8 @@ static int compare_model(const char *folder, const char *file) {
     compare_adaptive(mesh, depth_for(mesh), 1, &own[chaikin]);
     judge(file, chaikin ? "chaikin" : "uniform", &own[chaikin]);
     tally others[2] = {{0, 0, 0, 0, 0}, {0, 0, 0, 0, 0}};
-    for (unsigned rules = 0; rules < VARIANT_RULES && mesh->n_patches < 700; ++rules) {
+    for (unsigned rules = 0; rules < VARIANT_RULES && mesh->n_patches < (CHECK_SANITIZED ? 30 : 700);
+         ++rules) {
         qp_mesh *variant = variant_make(mesh, rules, QP_SHARPNESS_INFINITE, &err);
         if (!CHECK(variant != NULL)) continue;
         compare_adaptive(variant, 10, 1 + variant->n_patches / 200, &others[rules / 3 % 2]);
@@ -170,7 +171,7 @@ static void compare_masks(const qp_mesh *base, unsigned rules, mask_tally *t) {
 }
 
 static void compare_random(void) {
-    enum { SEEDS = 8, FACES = 60 };
+    enum { SEEDS = CHECK_SANITIZED ? 4 : 8, FACES = 60 };
     tally adaptive[2] = {{0, 0, 0, 0, 0}, {0, 0, 0, 0, 0}};
     mask_tally masks = {0, 0, 0, 0, 0};
     for (unsigned i = 0; i < 2 * SEEDS; ++i) {
