@@ -3,26 +3,13 @@
  *   bench_frame [--device D] [--double] [--general] [--repeat N] MESH.obj FACTOR...
  *
  * One line a factor: medians over N repeats (default 21), frames and memsets interleaved. */
+#include "host/base/measure.h"
 #include "host/base/status.h"
 #include "quadplan.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-static int compare_doubles(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-static double median(double *values, int n) {
-    qsort(values, (size_t)n, sizeof *values, compare_doubles);
-    return values[n / 2];
-}
-
-static void set_bytes(void *context, size_t begin, size_t end, unsigned worker) {
-    memset((char *)context + begin, (int)worker, end - begin);
-}
 
 static int fail(const qp_error *err) {
     fprintf(stderr, "bench_frame: %s\n", err->message);
@@ -47,15 +34,14 @@ static int measure(qp_frame *frame, float factor, int repeat, size_t real_size, 
         hull[i] = stream.hull_ms;
         domain[i] = stream.domain_ms;
         whole[i] = stream.frame_ms;
-        double start = qp_now_ms();
-        qp_parallel(bytes, bytes / qp_thread_count() + 1, set_bytes, block);
-        plain[i] = qp_now_ms() - start;
+        plain[i] = qp_memset_ms(block, bytes);
     }
     free(block);
-    double ms = median(whole, repeat), memset_ms = median(plain, repeat);
+    double ms = qp_median(whole, (size_t)repeat), memset_ms = qp_median(plain, (size_t)repeat);
     printf("%6g %10llu %9.3f %9.3f %9.3f %9.1f %8.3f %10llu\n", (double)factor,
-           (unsigned long long)stream.n_samples, median(hull, repeat), median(domain, repeat), ms,
-           (double)stream.n_samples / ms * 1e-3, memset_ms / ms, (unsigned long long)stream.support_bytes);
+           (unsigned long long)stream.n_samples, qp_median(hull, (size_t)repeat),
+           qp_median(domain, (size_t)repeat), ms, (double)stream.n_samples / ms * 1e-3, memset_ms / ms,
+           (unsigned long long)stream.support_bytes);
     return 0;
 }
 

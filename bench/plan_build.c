@@ -7,7 +7,7 @@
  * use one thread. Medians are printed. Then a regular mesh of a million faces: its plans must not grow with
  * it. */
 #define _GNU_SOURCE
-#include "host/base/median.h"
+#include "host/base/measure.h"
 #include "host/mesh/mesh.h"
 #include "host/peer/osd.h"
 

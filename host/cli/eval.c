@@ -1,10 +1,9 @@
 /* quadplan eval: the vertex stream, to a file and timed. */
-#include "host/base/median.h"
+#include "host/base/measure.h"
 #include "host/cli/evaluation.h"
 
 #include <inttypes.h>
 #include <stdlib.h>
-#include <string.h>
 
 enum { MOST_REPEATS = 1000 };
 
@@ -14,10 +13,6 @@ typedef struct timings {
     double hull[MOST_REPEATS], domain[MOST_REPEATS], frame[MOST_REPEATS], fill[MOST_REPEATS];
     uint64_t peak_support_bytes;
 } timings;
-
-static void fill_part(void *context, size_t begin, size_t end, unsigned worker) {
-    memset((unsigned char *)context + begin, (int)(worker & 255), end - begin);
-}
 
 /* Evaluates `repeats` times, each beside a memset of as many bytes on all cores. The stream is the last one.
  */
@@ -40,9 +35,7 @@ static qp_status measure(const cli_evaluation *evaluation, const qp_tessellation
                 break;
             }
         }
-        double begin = qp_now_ms();
-        qp_parallel(size, size / (4 * qp_thread_count()) + 1, fill_part, buffer);
-        double fill = qp_now_ms() - begin;
+        double fill = qp_memset_ms(buffer, size);
         if (i == 0) continue;
         t->hull[i - 1] = stream->hull_ms;
         t->domain[i - 1] = stream->domain_ms;
