@@ -4,6 +4,8 @@ source "$(dirname "$0")/common.sh"
 prefix=$work/prefix
 check "install" cmake --install "$QUADPLAN_BINARY_DIR" --prefix "$prefix"
 check "program" [ -x "$prefix/bin/quadplan" ]
+check "program draws, with its module for pictures" "$prefix/bin/quadplan" render --device host --size 16x16 --tess 1 \
+    "$QUADPLAN_SOURCE_DIR/scenes/creased-torus.json" -o "$work/picture.png"
 check "man page" [ -s "$prefix/share/man/man1/quadplan.1" ]
 library=$(find "$prefix" -name libquadplan.so)
 check "library" [ -n "$library" ]
