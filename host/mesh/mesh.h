@@ -94,6 +94,11 @@ bool qp_face_is_regular(const qp_mesh *mesh, uint32_t face);
  * time. */
 qp_status qp_mesh_analyse(qp_mesh *mesh, const char *name, const qp_mesh_options *options, qp_error *err);
 
+/* Puts the rules that *options overrides in place of the mesh's own. They are part of its analysis, so the mesh is made anew from
+ * its own arrays and *mesh replaced; texture coordinates and face lines are not carried over, so this is for generated meshes (a
+ * reader takes the options itself). *mesh stays as it was on failure. */
+qp_status qp_mesh_apply_options(qp_mesh **mesh, const qp_mesh_options *options, qp_error *err);
+
 /* Writes an OBJ with tags that qp_mesh_read_obj reads back to the same mesh (17 significant digits). */
 qp_status qp_mesh_write_obj(const qp_mesh *mesh, const char *path, qp_error *err);
 

@@ -4,39 +4,6 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* A generated mesh knows nothing of the scene's rules: it is made again with them. */
-static qp_status with_rules(const qp_scene *scene, qp_mesh **mesh, qp_error *err) {
-    const qp_mesh_options *o = &scene->mesh_options;
-    if (!o->override_boundary && !o->override_crease_method && !o->override_triangle_rule) return QP_OK;
-    qp_mesh *m = *mesh;
-    uint32_t *sizes = qp_alloc(m->n_faces, sizeof *sizes, false);
-    if (sizes == NULL) return qp_fail_memory(err, m->n_faces * sizeof *sizes, "face sizes");
-    for (uint32_t f = 0; f < m->n_faces; f++) sizes[f] = qp_face_size(m, f);
-    qp_mesh_desc desc = {.n_vertices = m->n_vertices,
-                         .n_faces = m->n_faces,
-                         .positions = m->positions,
-                         .face_sizes = sizes,
-                         .face_vertices = m->face_vertices,
-                         .n_creases = m->n_creases,
-                         .crease_vertices = m->crease_vertices,
-                         .crease_sharpness = m->crease_sharpness,
-                         .n_corners = m->n_corner_tags,
-                         .corner_vertices = m->corner_tag_vertices,
-                         .corner_sharpness = m->corner_tag_sharpness,
-                         .n_holes = m->n_hole_tags,
-                         .hole_faces = m->hole_tag_faces,
-                         .boundary = o->override_boundary ? o->boundary : m->boundary,
-                         .crease_method = o->override_crease_method ? o->crease_method : m->crease_method,
-                         .triangle_rule = o->override_triangle_rule ? o->triangle_rule : m->triangle_rule};
-    qp_mesh *remade = NULL;
-    qp_status status = qp_mesh_create(&desc, &remade, err);
-    free(sizes);
-    if (status != QP_OK) return status;
-    qp_mesh_free(m);
-    *mesh = remade;
-    return QP_OK;
-}
-
 qp_status qp_scene_mesh(const qp_scene *scene, void (*warn)(void *context, const char *line),
                         void *warn_context, qp_mesh **mesh, qp_error *err) {
     *mesh = NULL;
@@ -45,7 +12,8 @@ qp_status qp_scene_mesh(const qp_scene *scene, void (*warn)(void *context, const
     options.warn_context = warn_context;
     if (scene->mesh_path != NULL) return qp_mesh_read_obj(scene->mesh_path, &options, mesh, err);
     qp_status status = qp_mesh_generate(scene->generate_kind, &scene->generate, mesh, err);
-    if (status == QP_OK) status = with_rules(scene, mesh, err);
+    /* A generated mesh knows nothing of the scene's rules. */
+    if (status == QP_OK) status = qp_mesh_apply_options(mesh, &options, err);
     if (status != QP_OK) {
         qp_mesh_free(*mesh);
         *mesh = NULL;
