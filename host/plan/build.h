@@ -43,11 +43,15 @@ typedef struct qp_builder {
 void qp_builder_free(qp_builder *builder);
 
 /* Builds the plan of the cell that qp_gather_cell left in builder->local (level 0; of an n-gon, the child at
- * corner 0). *plan is malloced; *kinds, when not NULL, gets the QP_POINT_* and depth (kind | depth << 2) of
- * each point, malloced. NULL and builder->failed when memory is out; NULL and builder->too_large as above. */
+ * corner 0). The plan is malloced. NULL and builder->failed when memory is out; NULL and builder->too_large as above. */
 qp_plan *qp_build_plan(qp_builder *builder, const qp_cell *cell, bool child);
 
 void qp_plan_free(qp_plan *plan);
+
+/* Places in a 4x4 grid of control points, row-major from (-1,-1): of corner i of the cell, of the two points beyond its
+ * edge i, and of the point beyond corner i. */
+static const uint8_t qp_grid_inner[4] = {5, 6, 10, 9}, qp_grid_beyond_a[4] = {1, 7, 14, 8},
+                     qp_grid_beyond_b[4] = {2, 11, 13, 4}, qp_grid_outer[4] = {0, 3, 15, 12};
 
 /* nodes.c: what kind of leaf a cell is. */
 bool qp_cell_is_regular(const qp_cell *cell);

@@ -131,9 +131,7 @@ bool qp_plan_is_permanent(const qp_builder *b, uint32_t level, const qp_item *it
     if (item->chain == QP_NONE) return false;
     if (level - b->base >= b->depth) return true;
     const qp_fan *fan = item->cell->corner[b->chains[item->chain].corner].fan;
-    bool semi = qp_sharp_is_semi(fan->sharpness);
-    for (uint32_t j = 0; j < qp_fan_spokes(fan); ++j) semi = semi || qp_sharp_is_semi(fan->sharp[j]);
-    return !semi && level - b->base >= QP_PLAN_SHARED_LEVELS;
+    return !qp_fan_has_semi_sharp(fan) && level - b->base >= QP_PLAN_SHARED_LEVELS;
 }
 
 static uint32_t move_point(qp_local *tail, qp_level *to, const qp_level *from, uint32_t point,

@@ -98,11 +98,7 @@ static float far_sharpness(const qp_mesh *mesh, uint32_t vertex, uint32_t edge) 
         sum += (double)s;
         ++count;
     }
-    if (!qp_sharp_is_semi(own)) return own;
-    float child = own;
-    if (count > 1) child = 0.75f * own + 0.25f * (((float)sum - own) / (float)(count - 1));
-    child -= 1.0f;
-    return child > 0.0f ? child : 0.0f;
+    return qp_sharp_chaikin(own, sum, count);
 }
 
 static uint32_t float_bits(float f) {

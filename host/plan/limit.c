@@ -28,7 +28,8 @@ typedef struct masks {
     bool has_tangents;
 } masks;
 
-static void smooth_masks(uint32_t n, masks *m) {
+/* Angles are counted from spoke `first`. */
+static void smooth_masks(uint32_t n, uint32_t first, masks *m) {
     double *e1 = m->t1 + 1, *f1 = e1 + n, *e2 = m->t2 + 1, *f2 = e2 + n;
     double d = n;
     m->p[0] = d / (d + 5.0);
@@ -38,16 +39,15 @@ static void smooth_masks(uint32_t n, masks *m) {
     }
     m->has_tangents = true;
     if (n == 2) {
-        /* Both modes have eigenvalue 1/4; the general sine mask vanishes, the mode lives on the faces alone.
-         */
-        e1[0] = 1.0, e1[1] = -1.0;
-        f2[0] = 1.0, f2[1] = -1.0;
+        /* Both modes have eigenvalue 1/4; the general sine mask vanishes, the mode lives on the faces alone. */
+        e1[first] = f2[first] = 1.0;
+        e1[1 - first] = f2[1 - first] = -1.0;
         return;
     }
     double step = 2.0 * pi / d;
     double a = 1.0 + cos(step) + cos(pi / d) * sqrt(18.0 + 2.0 * cos(step));
     for (uint32_t j = 0; j < n; ++j) {
-        double t = step * j, next = step * (j + 1);
+        double t = step * ((double)j - first), next = step * ((double)j + 1.0 - first);
         e1[j] = a * cos(t), e2[j] = a * sin(t);
         f1[j] = cos(t) + cos(next), f2[j] = sin(t) + sin(next);
     }
@@ -94,23 +94,11 @@ static double sum_of(const double *w, uint32_t count) {
  * doubles. */
 static void dart_masks(uint32_t n, uint32_t dart, masks *m, double *work) {
     uint32_t count = 1 + 2 * n;
-    smooth_masks(n, m);
+    smooth_masks(n, dart, m);
     for (int step = 0; step < 400; ++step) {
         dart_step(n, dart, m->p, work);
         double s = sum_of(work, count);
         for (uint32_t i = 0; i < count; ++i) m->p[i] = work[i] / s;
-    }
-    double *e1 = m->t1 + 1, *f1 = e1 + n, *e2 = m->t2 + 1, *f2 = e2 + n;
-    if (n == 2) {
-        if (dart == 1) e1[0] = -1.0, e1[1] = 1.0;
-        if (dart == 1) f2[0] = -1.0, f2[1] = 1.0;
-    } else {
-        double step = 2.0 * pi / n, a = 1.0 + cos(step) + cos(pi / n) * sqrt(18.0 + 2.0 * cos(step));
-        for (uint32_t j = 0; j < n; ++j) {
-            double t = step * ((double)j - dart), next = step * ((double)j + 1.0 - dart);
-            e1[j] = a * cos(t), e2[j] = a * sin(t);
-            f1[j] = cos(t) + cos(next), f2[j] = sin(t) + sin(next);
-        }
     }
     for (int step = 0; step < 600; ++step) {
         dart_step(n, dart, m->t1, work);
@@ -160,7 +148,7 @@ static void fan_masks(const qp_corner *corner, masks *m, double *work) {
         last = j;
     }
     if (!qp_sharp_is_infinite(fan->sharpness) && sharp == 0) {
-        smooth_masks(fan->faces, m);
+        smooth_masks(fan->faces, 0, m);
     } else if (!qp_sharp_is_infinite(fan->sharpness) && sharp == 1) {
         dart_masks(fan->faces, last, m, work);
     } else if (!qp_sharp_is_infinite(fan->sharpness) && sharp == 2) {
@@ -205,12 +193,6 @@ static void normalise_row(double *row, uint32_t width) {
     for (uint32_t k = 0; k < width; ++k) row[k] /= largest;
 }
 
-static bool has_semi_sharp(const qp_fan *fan) {
-    bool semi = qp_sharp_is_semi(fan->sharpness);
-    for (uint32_t j = 0; j < qp_fan_spokes(fan); ++j) semi = semi || qp_sharp_is_semi(fan->sharp[j]);
-    return semi;
-}
-
 static bool has_general_face(const qp_fan *fan) {
     for (uint32_t j = 0; j < fan->faces; ++j) {
         if (fan->diagonal[j] == QP_NONE) return true;
@@ -229,7 +211,7 @@ void qp_limit_stencils(qp_local *local, const qp_level *from, const qp_corner *c
     qp_corner c = *corner;
     const qp_level *level = from;
     int turn = 0;
-    while ((has_semi_sharp(c.fan) || has_general_face(c.fan)) && !own.failed) {
+    while ((qp_fan_has_semi_sharp(c.fan) || has_general_face(c.fan)) && !own.failed) {
         qp_level *to = &own.level[turn];
         qp_level_clear(to);
         c.fan = qp_refine_fan(&own, (qp_level *)level, to, c.fan);

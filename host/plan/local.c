@@ -140,14 +140,18 @@ bool qp_sharp_is_semi(float s) {
     return s > 0.0f && s < QP_SHARPNESS_INFINITE;
 }
 
+bool qp_fan_has_semi_sharp(const qp_fan *fan) {
+    bool semi = qp_sharp_is_semi(fan->sharpness);
+    for (uint32_t j = 0; j < qp_fan_spokes(fan); ++j) semi = semi || qp_sharp_is_semi(fan->sharp[j]);
+    return semi;
+}
+
 float qp_sharp_decrement(float s) {
     if (qp_sharp_is_infinite(s)) return QP_SHARPNESS_INFINITE;
     return s > 1.0f ? s - 1.0f : 0.0f;
 }
 
-/* Chaikin's rule for one of `count` semi-sharp edges around a vertex whose sharpnesses add up to `sum` (in
- * double, so that the sum does not depend on where the walk around the vertex began). */
-static float chaikin(float s, double sum, uint32_t count) {
+float qp_sharp_chaikin(float s, double sum, uint32_t count) {
     if (!qp_sharp_is_semi(s)) return s;
     if (count < 2) return qp_sharp_decrement(s);
     float others = ((float)sum - s) / (float)(count - 1);
@@ -167,7 +171,7 @@ static void child_sharpness(const qp_local *local, const float *sharp, uint32_t 
         }
     }
     for (uint32_t j = 0; j < spokes; ++j) {
-        child[j] = local->chaikin ? chaikin(sharp[j], sum, count) : qp_sharp_decrement(sharp[j]);
+        child[j] = local->chaikin ? qp_sharp_chaikin(sharp[j], sum, count) : qp_sharp_decrement(sharp[j]);
     }
 }
 
@@ -404,7 +408,7 @@ static qp_fan *vertex_fan(qp_local *local, qp_level *to, const qp_fan *fan, cons
         uint32_t count = (qp_sharp_is_semi(near) ? 1u : 0u) + (qp_sharp_is_semi(far) ? 1u : 0u);
         double sum =
             (qp_sharp_is_semi(near) ? (double)near : 0.0) + (qp_sharp_is_semi(far) ? (double)far : 0.0);
-        child->far_sharp[j] = local->chaikin ? chaikin(near, sum, count) : qp_sharp_decrement(near);
+        child->far_sharp[j] = local->chaikin ? qp_sharp_chaikin(near, sum, count) : qp_sharp_decrement(near);
     }
     return child;
 }

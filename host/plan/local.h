@@ -116,7 +116,7 @@ qp_fan *qp_refine_fan(qp_local *local, qp_level *from, qp_level *to, const qp_fa
 
 /* Limit stencils of a corner: position, and two tangents whose cross product points along the normal of the
  * side the cell is on. rows: 3 * width doubles. *has_tangents is false where there is no tangent plane. The
- * fan lives in `from`; `scratch` levels are used where semi-sharp features must first decay. */
+ * fan lives in `from`; where semi-sharp features must first decay it is refined on its own. */
 void qp_limit_stencils(qp_local *local, const qp_level *from, const qp_corner *corner, double *rows,
                        bool *has_tangents);
 
@@ -124,5 +124,10 @@ bool qp_sharp_is_semi(float s);
 bool qp_sharp_is_infinite(float s);
 /* After one subdivision, by the uniform rule. */
 float qp_sharp_decrement(float s);
+/* By Chaikin's rule, for one of `count` semi-sharp edges around a vertex whose sharpnesses add up to `sum` (in double, so
+ * that the sum does not depend on where the walk around the vertex began). */
+float qp_sharp_chaikin(float s, double sum, uint32_t count);
+/* Some spoke or the vertex is semi-sharp, so that the rules here change with the level. */
+bool qp_fan_has_semi_sharp(const qp_fan *fan);
 
 #endif

@@ -93,34 +93,35 @@ static uint32_t phantom(qp_local *local, qp_level *level, uint32_t a, uint32_t b
 
 void qp_cell_points(qp_local *local, qp_level *level, const qp_cell *cell, uint32_t rotation,
                     uint32_t points[16]) {
-    /* Places of the corners, of the two points beyond edge i, and of the point beyond corner i. */
-    static const uint8_t inner[4] = {5, 6, 10, 9}, beyond_a[4] = {1, 7, 14, 8}, beyond_b[4] = {2, 11, 13, 4},
-                         outer[4] = {0, 3, 15, 12};
     const qp_corner *c[4];
     bool sharp[4];
     for (uint32_t i = 0; i < 4; ++i) {
         c[i] = &cell->corner[(rotation + i) & 3];
         sharp[i] = qp_sharp_is_infinite(qp_corner_sharp(c[i], 0));
-        points[inner[i]] = c[i]->fan->vertex;
+        points[qp_grid_inner[i]] = c[i]->fan->vertex;
     }
     for (uint32_t i = 0; i < 4; ++i) {
         uint32_t next = (i + 1) & 3, prev = (i + 3) & 3, far = (i + 2) & 3;
         if (sharp[i]) {
-            points[beyond_a[i]] = phantom(local, level, points[inner[i]], points[inner[prev]]);
-            points[beyond_b[i]] = phantom(local, level, points[inner[next]], points[inner[far]]);
+            points[qp_grid_beyond_a[i]] =
+                phantom(local, level, points[qp_grid_inner[i]], points[qp_grid_inner[prev]]);
+            points[qp_grid_beyond_b[i]] =
+                phantom(local, level, points[qp_grid_inner[next]], points[qp_grid_inner[far]]);
         } else {
-            points[beyond_a[i]] = c[i]->fan->spoke[qp_corner_spoke(c[i], -1)];
-            points[beyond_b[i]] = c[next]->fan->spoke[qp_corner_spoke(c[next], 2)];
+            points[qp_grid_beyond_a[i]] = c[i]->fan->spoke[qp_corner_spoke(c[i], -1)];
+            points[qp_grid_beyond_b[i]] = c[next]->fan->spoke[qp_corner_spoke(c[next], 2)];
         }
     }
     for (uint32_t i = 0; i < 4; ++i) {
         uint32_t prev = (i + 3) & 3;
         if (sharp[i]) {
-            points[outer[i]] = phantom(local, level, points[beyond_b[prev]], points[beyond_a[prev]]);
+            points[qp_grid_outer[i]] =
+                phantom(local, level, points[qp_grid_beyond_b[prev]], points[qp_grid_beyond_a[prev]]);
         } else if (sharp[prev]) {
-            points[outer[i]] = phantom(local, level, points[beyond_a[i]], points[beyond_b[i]]);
+            points[qp_grid_outer[i]] =
+                phantom(local, level, points[qp_grid_beyond_a[i]], points[qp_grid_beyond_b[i]]);
         } else {
-            points[outer[i]] = c[i]->fan->diagonal[qp_corner_face(c[i], 2)];
+            points[qp_grid_outer[i]] = c[i]->fan->diagonal[qp_corner_face(c[i], 2)];
         }
     }
 }

@@ -16,8 +16,7 @@ typedef struct qp_final_point {
     uint32_t order;  /* becomes its index once sorted */
 } qp_final_point;
 
-/* One dimension of a cell: [lo, hi], and whether a sample at either end comes here or goes to the neighbour.
- */
+/* One dimension of a cell: [lo, hi], and whether a sample at either end comes here or goes on. */
 typedef struct qp_span {
     uint32_t lo, hi;
     bool own_lo, own_hi;
@@ -26,17 +25,16 @@ typedef struct qp_span {
 typedef struct qp_item {
     qp_cell *cell;
     qp_span u, v;
-    uint32_t
-        parent_word; /* tree word that is to hold this node's offset; QP_NONE: the root, or a chain's tail */
-    uint32_t chain;  /* the terminal chain this cell ends or goes on with, or QP_NONE */
+    uint32_t parent_word; /* tree word for this node's offset; QP_NONE: the root, or a chain's tail */
+    uint32_t chain;       /* the terminal chain this cell ends or goes on with, or QP_NONE */
 } qp_item;
 
 /* Rings of the first two levels may overlap those of other corners of the patch, and are shared; deeper ones never do, and are
  * stored as offsets from their corner's limit point. */
 #define QP_PLAN_SHARED_LEVELS 2u
 
-/* Semi-sharp features have decayed by level 10, and what is irregular then are single vertices, which are terminal nodes' corners; deeper
- * internal nodes are cells of a mesh that is degenerate in some way, and would double with every level. */
+/* Semi-sharp features have decayed by level 10, and what is irregular then are single vertices, which are terminal
+ * nodes' corners; deeper internal nodes would double with every level. */
 #define QP_PLAN_INTERNAL_LEVELS 12u
 
 /* A terminal node in the making: its rings are known level by level. */

@@ -82,15 +82,13 @@ static bool append_ring(qp_surface *s, size_t *capacity, const uint32_t *ring, u
 
 /* The 4x4 control points of a regular face, row-major from (-1,-1). */
 static void regular_ring(const qp_mesh *m, uint32_t face, uint32_t ring[16]) {
-    static const uint8_t inner[4] = {5, 6, 10, 9}, beyond_a[4] = {1, 7, 14, 8}, beyond_b[4] = {2, 11, 13, 4},
-                         outer[4] = {0, 3, 15, 12};
     for (uint32_t i = 0; i < 4; ++i) {
         uint32_t corner = m->face_offsets[face] + i;
         uint32_t across = m->corner_twin[corner], side = qp_corner_next(m, across);
-        ring[inner[i]] = m->face_vertices[corner];
-        ring[beyond_a[i]] = m->face_vertices[qp_corner_next(m, side)];
-        ring[beyond_b[i]] = m->face_vertices[qp_corner_prev(m, across)];
-        ring[outer[i]] = m->face_vertices[qp_corner_prev(m, m->corner_twin[side])];
+        ring[qp_grid_inner[i]] = m->face_vertices[corner];
+        ring[qp_grid_beyond_a[i]] = m->face_vertices[qp_corner_next(m, side)];
+        ring[qp_grid_beyond_b[i]] = m->face_vertices[qp_corner_prev(m, across)];
+        ring[qp_grid_outer[i]] = m->face_vertices[qp_corner_prev(m, m->corner_twin[side])];
     }
 }
 
