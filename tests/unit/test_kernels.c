@@ -181,10 +181,8 @@ static void run_both(qp_device *host, qp_device *opencl, int is_polynomial) {
     }
 }
 
-/* Regular plan: fast pass and general kernels give the same bits, and the uniform B-spline. */
-static void test_regular(qp_device *host, qp_device *opencl) {
-    hand_begin(&plan, 16);
-    for (uint32_t i = 0; i < 3; ++i) plan.positions[i] = hand_random(); /* an origin that is not zero */
+/* Ends the hand-made plan as the regular one: 16 identity rows, one regular node. */
+static void end_regular(void) {
     uint32_t indices[16];
     for (uint32_t i = 0; i < 16; ++i) {
         double *row;
@@ -196,6 +194,13 @@ static void test_regular(qp_device *host, qp_device *opencl) {
     hand_indices(&plan, indices, 16);
     hand_end(&plan, QP_PLAN_REGULAR);
     plan.surface.regular_plan = 0;
+}
+
+/* Regular plan: fast pass and general kernels give the same bits, and the uniform B-spline. */
+static void test_regular(qp_device *host, qp_device *opencl) {
+    hand_begin(&plan, 16);
+    for (uint32_t i = 0; i < 3; ++i) plan.positions[i] = hand_random(); /* an origin that is not zero */
+    end_regular();
     scatter();
     run_both(host, opencl, 0);
     for (int precision = QP_FLOAT; precision <= QP_DOUBLE; ++precision) {
@@ -510,17 +515,7 @@ static void test_scales(qp_device *host, qp_device *opencl) {
             plan.positions[3 * i + 1] = scales[k] * (i / 4);
             plan.positions[3 * i + 2] = 0;
         }
-        uint32_t indices[16];
-        for (uint32_t i = 0; i < 16; ++i) {
-            double *row;
-            indices[i] = hand_point(&plan, &row);
-            row[i] = 1;
-        }
-        hand_word(&plan, QP_NODE_REGULAR);
-        hand_word(&plan, QP_NO_POINT);
-        hand_indices(&plan, indices, 16);
-        hand_end(&plan, QP_PLAN_REGULAR);
-        plan.surface.regular_plan = 0;
+        end_regular();
         scatter();
         for (int slow = 0; slow < 2; ++slow) {
             qp_frame *frame = NULL;
