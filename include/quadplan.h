@@ -115,17 +115,21 @@ QP_API uint32_t qp_mesh_face_count(const qp_mesh *mesh);
 QP_API uint32_t qp_mesh_patch_count(const qp_mesh *mesh);
 /* 3 doubles a vertex, owned by the mesh. */
 QP_API const double *qp_mesh_positions(const qp_mesh *mesh);
+/* Edges, numbered by the mesh; the two vertices of each, lower index first: 2 an edge, owned by the mesh. */
+QP_API uint32_t qp_mesh_edge_count(const qp_mesh *mesh);
+QP_API const uint32_t *qp_mesh_edge_vertices(const qp_mesh *mesh);
 
 /* ---- Surfaces: patches and their subdivision plans
  * --------------------------------------------------------- */
 
-/* (u,v) are multiples of 2^-24. Plans of this depth end at single points of that grid, so no sample lies below them. */
-#define QP_DEPTH_LIMIT 24
+/* Deepest level that plans store. Below it the rings around a corner shrink by one ratio to working precision. */
+#define QP_DEPTH_LIMIT 60
 
 /* Zero-initialise for the defaults. */
 typedef struct qp_surface_options {
     uint32_t
-        depth; /* deepest subdivision level a plan stores, 1..QP_DEPTH_LIMIT; 0: 10. The paper's is 6 (factor 64). */
+        depth; /* deepest subdivision level a plan stores, 1..QP_DEPTH_LIMIT; 0: 10. The paper's is 6 (factor 64). Frames make
+                  deeper plans by themselves for the patches whose samples lie below, so this is about time and memory only. */
     int no_crease_nodes;   /* subdivide along single semi-sharp creases instead (for comparison) */
     int no_terminal_nodes; /* internal nodes instead of terminal ones (for comparison) */
 } qp_surface_options;
@@ -178,13 +182,22 @@ typedef struct qp_tessellation {
     qp_spacing spacing;
     float factor; /* uniform factor, 1 to 64, used when patch_factors is NULL */
     /* 6 a patch in ptex order: the GL quad domain's outer levels 0..3 (edges u=0, v=0, u=1, v=1), then the
-     * inner levels (u, v). A factor <= 0 or NaN discards the patch, as GL does. */
+     * inner levels (u, v). A factor <= 0 or NaN discards the patch, as GL does. Whoever gives them sees to it that both sides of
+     * an edge get the same. */
     const float *patch_factors;
+    /* 1 an edge of the mesh (qp_mesh_edge_vertices), 1 to 64, used when patch_factors is NULL; NULL: .factor everywhere. Patches
+     * get factors without cracks from them, n-gons and their neighbours included. */
+    const float *edge_factors;
 } qp_tessellation;
 
 enum {
-    QP_SAMPLE_PAST_DEPTH = 1, /* (u,v) lies below the plan's last level: an approximation was returned */
-    QP_SAMPLE_NO_NORMAL = 2   /* no tangent plane there: the normal is a fallback, (0,0,0) */
+    QP_SAMPLE_PAST_DEPTH =
+        1, /* (u,v) lies below the plan's last level: an approximation was returned (only with
+                                 no_exact_tail) */
+    QP_SAMPLE_NO_NORMAL = 2, /* no tangent plane there: the normal is a fallback, (0,0,0) */
+    QP_SAMPLE_LIMIT_FRAME =
+        4 /* at an extraordinary or creased corner, where du and dv need not exist: they are tangents from
+                                 limit masks, which span the tangent plane with du x dv along the normal; lengths are free */
 };
 
 /* What an evaluation made. All arrays belong to the frame and live until its next evaluation or its end. */
@@ -192,8 +205,10 @@ typedef struct qp_stream {
     qp_precision precision;
     uint64_t n_samples;
     const void *vertices; /* 6 float or double a sample: position, unit normal (right-handed, du x dv) */
-    const uint8_t *flags; /* n_samples, QP_SAMPLE_* */
-    const float *uv;      /* 2 a sample */
+    const void *
+        derivatives; /* 6 float or double a sample: dp/du, dp/dv in the patch's own (u,v); NULL unless asked for */
+    const uint8_t *flags;         /* n_samples, QP_SAMPLE_* */
+    const float *uv;              /* 2 a sample; of points, rounded from what was given */
     const uint32_t *sample_patch; /* n_samples */
     uint64_t n_triangles;
     const uint32_t *triangles; /* 3 sample indices a triangle, counter-clockwise; NULL unless asked for */
@@ -205,7 +220,10 @@ typedef struct qp_stream {
 typedef struct qp_frame_options {
     qp_precision precision;
     int want_triangles, want_hash;
+    int want_derivatives;
     int no_regular_pass; /* evaluate regular patches through the general kernels too (for comparison) */
+    int no_sharing; /* every patch evaluates its own edges, which leaves cracks of an ulp or so (for comparison) */
+    int no_exact_tail; /* samples below the depth of the surface's plans are approximated and flagged (for comparison) */
 } qp_frame_options;
 
 typedef struct qp_frame qp_frame;
@@ -219,9 +237,10 @@ QP_API qp_status qp_frame_update_positions(qp_frame *frame, qp_error *err);
 /* The vertex stream at the tessellator's points. */
 QP_API qp_status qp_frame_eval(qp_frame *frame, const qp_tessellation *tessellation, qp_stream *stream,
                                qp_error *err);
-/* The same at any points, in the order given: patch[i], uv[2 * i]. uv are multiples of 2^-24 in [0, 1]. */
-QP_API qp_status qp_frame_eval_points(qp_frame *frame, uint64_t count, const uint32_t *patch, const float *uv,
-                                      qp_stream *stream, qp_error *err);
+/* The same at any points, in the order given: patch[i], uv[2 * i], any numbers in [0, 1]. On the device a coordinate is the
+ * distance to the nearer end of [0, 1], rounded to the frame's precision, so that it keeps its digits close to either. */
+QP_API qp_status qp_frame_eval_points(qp_frame *frame, uint64_t count, const uint32_t *patch,
+                                      const double *uv, qp_stream *stream, qp_error *err);
 
 #ifdef __cplusplus
 }

@@ -34,8 +34,8 @@ QP_FUNCTION void QP_NAME(add_origin)(__global const real4 *support, uint origin,
 QP_FUNCTION void QP_NAME(eval_regular)(__global const real4 *support, __global const uint *node, real u,
                                        real v, QP_NAME(surface_point) * s) {
     real bu[4], du[4], bv[4], dv[4];
-    QP_NAME(basis)(u, bu, du);
-    QP_NAME(basis)(v, bv, dv);
+    QP_NAME(basis)(QP_NAME(plain)(u), bu, du);
+    QP_NAME(basis)(QP_NAME(plain)(v), bv, dv);
     QP_NAME(spline_grid)(support, node + 2, bu, du, bv, dv, s);
     QP_NAME(add_origin)(support, node[1], s);
 }
@@ -44,13 +44,14 @@ QP_FUNCTION void QP_NAME(eval_regular)(__global const real4 *support, __global c
 /* A single semi-sharp crease along v=0: across it the basis is that of the zone v lies in, times its matrix
  * (section 4.3; plan_layout.h). */
 QP_FUNCTION void QP_NAME(eval_crease)(__global const real4 *support, __global const uint *node,
-                                      __global const real *constants, real u, real v,
+                                      __global const real *constants, real u, real signed_v,
                                       QP_NAME(surface_point) * s) {
     real bu[4], du[4], b[4], d[4], bv[4], dv[4];
+    const real v = QP_NAME(plain)(signed_v);
     const uint zone = v >= constants[0] ? 0u : v >= constants[1] ? 1u : 2u;
     const real scale = constants[2u + zone];
     __global const real *m = constants + 5u + 16u * zone;
-    QP_NAME(basis)(u, bu, du);
+    QP_NAME(basis)(QP_NAME(plain)(u), bu, du);
     QP_NAME(basis)(v * scale, b, d);
     for (uint j = 0; j < 4u; ++j) {
         bv[j] = fma(b[3], m[12u + j], fma(b[2], m[8u + j], fma(b[1], m[4u + j], b[0] * m[j])));
@@ -75,10 +76,11 @@ QP_FUNCTION void QP_NAME(add_slots)(__global const real4 *support, __global cons
 QP_FUNCTION void QP_NAME(eval_ring)(__global const real4 *support, __global const uint *ring, uint origin,
                                     real u, real v, QP_NAME(surface_point) * s) {
     real bu[4], du[4], bv[4], dv[4];
-    const uint cx = u >= QP_R(0.5), cy = v >= QP_R(0.5);
+    const uint cx = QP_NAME(is_upper)(u, 1u), cy = QP_NAME(is_upper)(v, 1u);
     const uint slot = 5u * cy + cx - 1u;
-    QP_NAME(basis)(QP_R(2.0) * u - (real)cx, bu, du);
-    QP_NAME(basis)(QP_R(2.0) * v - (real)cy, bv, dv);
+    QP_NAME(basis)(QP_NAME(plain)(QP_NAME(in_half)(u, cx)), bu, du);
+    QP_NAME(basis)(QP_NAME(plain)(QP_NAME(in_half)(v, cy)), bv, dv);
+    s->level += 1;
     QP_NAME(add_slots)(support, ring, slot, 1, bu, du, bv[0], dv[0], s);
     QP_NAME(add_slots)(support, ring, slot + 5u, 0, bu, du, bv[1], dv[1], s);
     QP_NAME(add_slots)(support, ring, slot + 10u, 0, bu, du, bv[2], dv[2], s);
@@ -100,14 +102,17 @@ QP_FUNCTION void QP_NAME(eval_limit)(__global const real4 *support, __global con
         s->du = support[t1];
         s->dv = support[t2];
     }
+    s->level = 0;
+    s->flags |= QP_FLAG_LIMIT_FRAME;
 }
 
 /* A leaf with four corners known: exact there, and a bilinear blend, flagged, elsewhere. */
 QP_FUNCTION void QP_NAME(eval_irregular)(__global const real4 *support, __global const uint *node, real u,
                                          real v, QP_NAME(surface_point) * s) {
-    const int at_u = u == QP_R(0.0) || u == QP_R(1.0), at_v = v == QP_R(0.0) || v == QP_R(1.0);
     __global const uint *words = node + 1;
-    if (at_u && at_v) {
+    u = QP_NAME(plain)(u);
+    v = QP_NAME(plain)(v);
+    if ((u == QP_R(0.0) || u == QP_R(1.0)) && (v == QP_R(0.0) || v == QP_R(1.0))) {
         const uint corner = v == QP_R(0.0) ? (u == QP_R(0.0) ? 0u : 1u) : (u == QP_R(0.0) ? 3u : 2u);
         QP_NAME(eval_limit)(support, words, 3u * corner, s);
         return;
@@ -127,9 +132,9 @@ QP_FUNCTION void QP_NAME(eval_irregular)(__global const real4 *support, __global
 /* What remains at an extraordinary corner (0,0): exact there; elsewhere, flagged, on the ray from the limit
  * point to where it leaves the corner cell, which the terminal's last ring covers. */
 QP_FUNCTION void QP_NAME(eval_extraordinary)(__global const real4 *support, __global const uint *node,
-                                             __global const uint *ring, uint origin, real u, real v,
-                                             QP_NAME(surface_point) * s) {
-    const real t = u > v ? u : v;
+                                             __global const uint *ring, uint origin, real signed_u,
+                                             real signed_v, QP_NAME(surface_point) * s) {
+    const real u = QP_NAME(plain)(signed_u), v = QP_NAME(plain)(signed_v), t = u > v ? u : v;
     /* Points 0..2 are 16-bit values in a word each. */
     if (t == QP_R(0.0) || ring == 0) {
         s->p = support[node[1]];
@@ -139,6 +144,8 @@ QP_FUNCTION void QP_NAME(eval_extraordinary)(__global const real4 *support, __gl
             s->du = support[node[2]];
             s->dv = support[node[3]];
         }
+        s->level = 0;
+        s->flags |= QP_FLAG_LIMIT_FRAME;
         if (t != QP_R(0.0)) s->flags |= QP_FLAG_PAST_DEPTH;
         return;
     }
@@ -150,7 +157,7 @@ QP_FUNCTION void QP_NAME(eval_extraordinary)(__global const real4 *support, __gl
 }
 #endif
 
-/* The leaf of (u,v), evaluated. */
+/* The leaf of (u,v), evaluated; s->turn is how (u,v) was turned before. */
 QP_FUNCTION void QP_NAME(eval_tree)(__global const uint *tree, __global const real *constants,
                                     __global const real4 *support, real u, real v,
                                     QP_NAME(surface_point) * s) {
@@ -160,14 +167,16 @@ QP_FUNCTION void QP_NAME(eval_tree)(__global const uint *tree, __global const re
     uint last_origin = QP_NO_POINT;
 #endif
     s->flags = 0;
+    s->level = 0;
     for (;;) {
         const uint word = node[0], kind = QP_NODE_KIND(word);
 #if QP_WITH_INTERNAL
         if (kind == QP_NODE_INTERNAL) {
-            const uint cu = u > QP_R(0.5) || (u == QP_R(0.5) && QP_NODE_TIE_U(word) == 0);
-            const uint cv = v > QP_R(0.5) || (v == QP_R(0.5) && QP_NODE_TIE_V(word) == 0);
-            u = QP_R(2.0) * u - (real)cu;
-            v = QP_R(2.0) * v - (real)cv;
+            const uint cu = QP_NAME(is_upper)(u, QP_NODE_TIE_U(word) == 0);
+            const uint cv = QP_NAME(is_upper)(v, QP_NODE_TIE_V(word) == 0);
+            u = QP_NAME(in_half)(u, cu);
+            v = QP_NAME(in_half)(v, cv);
+            s->level += 1;
             node = tree + node[1u + cu + 2u * cv];
             continue;
         }
@@ -177,13 +186,15 @@ QP_FUNCTION void QP_NAME(eval_tree)(__global const uint *tree, __global const re
             const uint rings = QP_NODE_RINGS(word), absolute = QP_NODE_ABSOLUTE_RINGS(word), origin = node[1];
             __global const uint *ring = node + 3;
             QP_NAME(rotate_uv)(QP_NODE_ROTATION(word), &u, &v);
+            s->turn += QP_NODE_ROTATION(word);
             for (uint k = 0; k < rings; ++k, ring += 12) {
-                if (u >= QP_R(0.5) || v >= QP_R(0.5)) {
+                if (QP_NAME(is_upper)(u, 1u) != 0 || QP_NAME(is_upper)(v, 1u) != 0) {
                     QP_NAME(eval_ring)(support, ring, k < absolute ? QP_NO_POINT : origin, u, v, s);
                     return;
                 }
-                u = QP_R(2.0) * u;
-                v = QP_R(2.0) * v;
+                u = QP_NAME(in_half)(u, 0u);
+                v = QP_NAME(in_half)(v, 0u);
+                s->level += 1;
             }
 #if QP_WITH_CORNERS
             last_ring = rings == 0 ? 0 : ring - 12;
@@ -191,6 +202,7 @@ QP_FUNCTION void QP_NAME(eval_tree)(__global const uint *tree, __global const re
 #endif
             /* The tail is in the frame that this node was entered in; an extraordinary corner turns itself. */
             QP_NAME(rotate_uv)((4u - QP_NODE_ROTATION(word)) & 3u, &u, &v);
+            s->turn -= QP_NODE_ROTATION(word);
             node = tree + node[2];
             continue;
         }
@@ -198,6 +210,7 @@ QP_FUNCTION void QP_NAME(eval_tree)(__global const uint *tree, __global const re
 #if QP_WITH_CREASE
         if (kind == QP_NODE_CREASE) {
             QP_NAME(rotate_uv)(QP_NODE_ROTATION(word), &u, &v);
+            s->turn += QP_NODE_ROTATION(word);
             QP_NAME(eval_crease)(support, node, constants + node[10], u, v, s);
             return;
         }
@@ -206,6 +219,7 @@ QP_FUNCTION void QP_NAME(eval_tree)(__global const uint *tree, __global const re
 #if QP_WITH_TERMINAL
         if (kind == QP_NODE_EXTRAORDINARY) {
             QP_NAME(rotate_uv)(QP_NODE_ROTATION(word), &u, &v);
+            s->turn += QP_NODE_ROTATION(word);
             QP_NAME(eval_extraordinary)(support, node, last_ring, last_origin, u, v, s);
             return;
         }
@@ -223,17 +237,18 @@ QP_FUNCTION void QP_NAME(eval_tree)(__global const uint *tree, __global const re
 __kernel void QP_NAME(domain)(__global const uint *heads, __global const uint *trees,
                               __global const real *reals, __global const uint *rings,
                               __global const real *positions, __global const uint *entries, uint first_entry,
-                              __global const real *support, __global const float *grid_u,
-                              __global const float *grid_v, __global real *vertices,
-                              __global uchar *flags QP_GROUP) {
+                              __global const real *support, __global const real *grid_u,
+                              __global const real *grid_v, __global real *vertices, __global uchar *flags,
+                              __global real *derivatives, uint want_derivatives QP_GROUP) {
     __global const uint *entry = entries + ((ulong)first_entry + get_group_id(0)) * QP_ENTRY_WORDS;
     __global const uint *head = heads + entry[QP_ENTRY_HEAD];
     __global const uint *tree = trees + head[QP_HEAD_TREE];
     __global const real *constants = reals + head[QP_HEAD_REALS];
     __global const real4 *points = (__global const real4 *)support + QP_ENTRY_WIDE(entry, QP_ENTRY_SUPPORT);
-    __global const float *us = grid_u + QP_ENTRY_WIDE(entry, QP_ENTRY_GRID);
-    __global const float *vs = grid_v + QP_ENTRY_WIDE(entry, QP_ENTRY_GRID);
-    __global const real *base = positions + 3u * (ulong)rings[QP_ENTRY_WIDE(entry, QP_ENTRY_RING)];
+    __global const real *us = grid_u + QP_ENTRY_WIDE(entry, QP_ENTRY_GRID);
+    __global const real *vs = grid_v + QP_ENTRY_WIDE(entry, QP_ENTRY_GRID);
+    __global const real *base =
+        positions + QP_POSITION_FIRST + 3u * (ulong)rings[QP_ENTRY_WIDE(entry, QP_ENTRY_RING)];
     const real4 origin = make4(base[0], base[1], base[2]);
     const ulong out = QP_ENTRY_WIDE(entry, QP_ENTRY_OUT);
     const uint rotation = entry[QP_ENTRY_ROTATION];
@@ -254,6 +269,7 @@ __kernel void QP_NAME(domain)(__global const uint *heads, __global const uint *t
             QP_NAME(surface_point) s;
             real u = us[i + l], v = vs[i + l];
             QP_NAME(rotate_uv)(rotation, &u, &v);
+            s.turn = rotation;
             QP_NAME(eval_tree)(tree, constants, points, u, v, &s);
             value[0][l] = s.p.x;
             value[1][l] = s.p.y;
@@ -265,6 +281,10 @@ __kernel void QP_NAME(domain)(__global const uint *heads, __global const uint *t
             value[7][l] = s.dv.y;
             value[8][l] = s.dv.z;
             flag[l] = s.flags;
+            if (want_derivatives != 0)
+                QP_NAME(write_derivatives)
+            (derivatives + 6u * (out + i + l), s.du, s.dv, s.turn,
+             ldexp(positions[QP_POSITION_SCALE], s.level));
         }
         lanes p[3], du[3], dv[3];
         for (uint c = 0; c < 3u; ++c) {
@@ -272,6 +292,6 @@ __kernel void QP_NAME(domain)(__global const uint *heads, __global const uint *t
             du[c] = load_lanes(value[3u + c]);
             dv[c] = load_lanes(value[6u + c]);
         }
-        QP_NAME(write_samples)(vertices, flags, out + i, block, origin, p, du, dv, flag);
+        QP_NAME(write_samples)(vertices, flags, out + i, block, positions, origin, p, du, dv, flag);
     }
 }

@@ -18,6 +18,19 @@
 /* Bits of a sample's flags, as QP_SAMPLE_* of quadplan.h. */
 #define QP_FLAG_PAST_DEPTH 1u
 #define QP_FLAG_NO_NORMAL 2u
+#define QP_FLAG_LIMIT_FRAME 4u
+
+/* The positions buffer begins with the frame that all positions are relative to, and then holds 3 reals a vertex: a vertex at x,
+ * in the mesh's own coordinates, is stored as (x - centre) / scale. centre is 0 unless the mesh is far from the origin, scale is a
+ * power of two near the mesh's size, so that nothing overflows or vanishes on the way and a mesh that is small and far away
+ * keeps its digits. */
+#define QP_POSITION_CENTRE 0u /* 3 reals */
+#define QP_POSITION_SCALE 3u
+#define QP_POSITION_FIRST 4u /* first real of vertex 0 */
+
+/* A coordinate x of a (u,v) is held by its distance to the nearer end of [0,1]: x up to 1/2 as it is, beyond as x - 1, with -0 for
+ * 1, so that the sign bit tells the end. Turning a patch (x becomes 1 - x) flips the sign, and going down the quadtree doubles:
+ * both exact for every number of the format, however close to an end. 1/2 is always positive. */
 
 /* Elements that may be read, and are ignored, behind the end of reals and of the grid. */
 #define QP_PADDING 16u

@@ -29,7 +29,8 @@ __kernel void QP_NAME(hull)(__global const uint *heads, __global const real *rea
     const uint ring_size = head[QP_HEAD_RING];
     const ulong points = head[QP_HEAD_POINTS];
     __global const real *weights = reals + head[QP_HEAD_REALS];
-    __global const real *origin = positions + 3u * (ulong)ring[0];
+    __global const real *vertices = positions + QP_POSITION_FIRST;
+    __global const real *origin = vertices + 3u * (ulong)ring[0];
     const real ox = origin[0], oy = origin[1], oz = origin[2];
     const uint item = (uint)get_local_id(0), items = (uint)get_local_size(0);
 
@@ -37,7 +38,7 @@ __kernel void QP_NAME(hull)(__global const uint *heads, __global const real *rea
         const uint count = ring_size - begin < QP_HULL_CHUNK ? ring_size - begin : QP_HULL_CHUNK;
         barrier(CLK_LOCAL_MEM_FENCE); /* nobody still reads the chunk before */
         for (uint j = item; j < count; j += items) {
-            __global const real *p = positions + 3u * (ulong)ring[begin + j];
+            __global const real *p = vertices + 3u * (ulong)ring[begin + j];
             ring_x[j] = p[0] - ox;
             ring_y[j] = p[1] - oy;
             ring_z[j] = p[2] - oz;

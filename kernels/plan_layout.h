@@ -14,11 +14,12 @@
  * Everything is relative to the patch origin, the position of ring vertex 0: the hull subtracts it from every
  * ring position first (exact or correctly rounded once), the domain stage adds it last. Weights of a row sum
  * to 1, or to 0 for tangents and for *offset* rows: the points of a terminal node are stored as offsets from
- * the limit position of its corner (point ORIGIN), so that they keep full relative precision however deep
- * they lie.
+ * the limit position of its corner (point ORIGIN), those of its ring number k times 2^k, so that they keep full
+ * relative precision however deep they lie.
  *
  * (u,v) of a plan: patches that share a plan by rotation r (0..3) put the plan's corner 0 at their own corner
- * r: r=0: (u,v); r=1: (v,1-u); r=2: (1-u,1-v); r=3: (1-v,u) are the plan's (u,v) of the patch's (u,v). */
+ * r: r=0: (u,v); r=1: (v,1-u); r=2: (1-u,1-v); r=3: (1-v,u) are the plan's (u,v) of the patch's (u,v). How the device holds a
+ * coordinate: frame_layout.h. */
 #ifndef QP_PLAN_LAYOUT_H
 #define QP_PLAN_LAYOUT_H
 
@@ -38,6 +39,7 @@
 #define QP_PLAN_TERMINAL 4u /* has terminal nodes */
 #define QP_PLAN_INTERNAL 8u /* has internal nodes */
 #define QP_PLAN_CORNERS 16u /* has extraordinary or irregular leaves */
+#define QP_PLAN_IRREGULAR 32u /* has irregular leaves */
 
 /* Word 0 of a node: kind in bits 0..2, rotation in bits 3..4 (crease, terminal, extraordinary), tie_u in bit 5,
  * tie_v in bit 6 (internal); of a terminal the count of its rings in bits 8..15 and in bits 16..23 how many of them,
@@ -61,8 +63,11 @@
  *   regular sub-domains, with cx = u>=.5, cy = v>=.5 its 16 points are (cx+a, cy+b), a,b in 0..3, and its (u,v) is
  *   2u-cx, 2v-cy; else (u,v) doubles and the next ring follows, or at last word 2's node.
  * EXTRAORDINARY: follows a TERMINAL only, in its rotated frame. words 1..3: limit position, first and second tangent
- *   points (cross(t1,t2) points along the normal; QP_NO_POINT tangents: no tangent plane). Exact at (0,0); elsewhere
- *   the sample is past the plan's depth: radial blend between the limit point and the terminal's last ring.
+ *   points (cross(t1,t2) points along the normal; QP_NO_POINT tangents: no tangent plane). Exact at (0,0). word 4: offset in reals
+ *   (relative to QP_HEAD_REALS) of the ratio r by which the rings shrink in the end. A sample elsewhere in the cell goes on
+ *   doubling, m times until u >= .5 or v >= .5, and is limit + r^m (p - limit), p the last ring's value there (Stam 1998: the
+ *   powers of the dominant eigenvalue). That is exact to working precision where QP_NODE_EXACT is set, and past the plan's depth
+ *   elsewhere: modes that decay a little faster than the dominant one still count after few levels.
  * IRREGULAR: words 1..6: 12 points: limit position, t1, t2 of the corners (0,0), (1,0), (1,1), (0,1), QP_NO_POINT
  *   where a tangent is undefined. Exact at the corners; elsewhere past depth: bilinear blend. */
 #define QP_NODE_INTERNAL 0u
@@ -78,6 +83,7 @@
 #define QP_NODE_TIE_V(w) (((w) >> 6) & 1u)
 #define QP_NODE_RINGS(w) (((w) >> 8) & 255u)
 #define QP_NODE_ABSOLUTE_RINGS(w) (((w) >> 16) & 255u)
+#define QP_NODE_EXACT (1u << 8) /* extraordinary */
 
 #define QP_NO_POINT 0xffffu
 #define QP_CREASE_REALS 53u

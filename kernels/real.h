@@ -19,10 +19,12 @@
 typedef double real;
 typedef double4 real4;
 #define QP_REAL_NAME double
+#define QP_AS_BITS as_long
 #else
 typedef float real;
 typedef float4 real4;
 #define QP_REAL_NAME float
+#define QP_AS_BITS as_int
 #endif
 
 QP_FUNCTION real4 make4(real x, real y, real z) {
@@ -42,13 +44,13 @@ QP_FUNCTION real4 make4(real x, real y, real z) {
 #if QP_LANES == 1
 typedef real lanes;
 #define load_lanes(p) (*(p))
-#define load_lanes_uv(p) ((real) * (p))
+#define plain_lanes(a) QP_NAME(plain)(a)
 #define store_lanes(v, p) (*(p) = (v))
 #define lanes_within(a, low, high) ((a) > (low) && (a) < (high))
 #else
 typedef QP_JOIN(QP_REAL_NAME, QP_LANES) lanes;
 #define load_lanes(p) QP_JOIN(vload, QP_LANES)(0, (p))
-#define load_lanes_uv(p) QP_JOIN(convert_, QP_JOIN(QP_REAL_NAME, QP_LANES))(QP_JOIN(vload, QP_LANES)(0, (p)))
+#define plain_lanes(a) select((a), (a) + (lanes)(QP_R(1.0)), QP_JOIN(QP_AS_BITS, QP_LANES)(a))
 #define store_lanes(v, p) QP_JOIN(vstore, QP_LANES)((v), 0, (p))
 #define lanes_within(a, low, high) all((a) > (lanes)(low) && (a) < (lanes)(high))
 #endif
@@ -157,7 +159,7 @@ QP_FUNCTION real4 fma4(real4 a, real s, real4 c) {
 
 #define lanes QP_NAME(lanes)
 #define load_lanes QP_NAME(load_lanes)
-#define load_lanes_uv QP_NAME(load_lanes_uv)
+#define plain_lanes QP_NAME(plain_lanes)
 #define store_lanes QP_NAME(store_lanes)
 #define lanes_within QP_NAME(lanes_within)
 #define splat QP_NAME(splat)
@@ -181,10 +183,10 @@ QP_FUNCTION lanes load_lanes(const real *p) {
     for (uint i = 0; i < QP_LANES; ++i) r.v[i] = p[i];
     return r;
 }
-QP_FUNCTION lanes load_lanes_uv(const float *p) {
-    lanes r;
-    for (uint i = 0; i < QP_LANES; ++i) r.v[i] = p[i];
-    return r;
+/* plain() of spline.h */
+QP_FUNCTION lanes plain_lanes(lanes a) {
+    for (uint i = 0; i < QP_LANES; ++i) a.v[i] = signbit(a.v[i]) ? QP_R(1.0) + a.v[i] : a.v[i];
+    return a;
 }
 QP_FUNCTION void store_lanes(lanes a, real *p) {
     for (uint i = 0; i < QP_LANES; ++i) p[i] = a.v[i];

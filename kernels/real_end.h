@@ -19,7 +19,7 @@
 #undef fma4
 #undef lanes
 #undef load_lanes
-#undef load_lanes_uv
+#undef plain_lanes
 #undef store_lanes
 #undef lanes_within
 #undef splat

@@ -36,6 +36,8 @@ QP_FUNCTION void QP_NAME(basis_lanes)(lanes t, lanes b[4], lanes d[4]) {
 typedef struct QP_NAME(surface_point) {
     real4 p, du, dv;
     uint flags;
+    int level; /* the leaf is 2^-level of the patch */
+    uint turn; /* rotation of the leaf's (u,v) against the patch's, mod 4 */
 } QP_NAME(surface_point);
 
 /* Adds row j of a 4x4 grid of points: bu, du weigh the row's points; bv, dv the row. Rows first, then across:
@@ -99,19 +101,67 @@ QP_FUNCTION real4 QP_NAME(unit_normal)(real4 du, real4 dv, uint *flags) {
     return scale4(n, qp_div(QP_R(1.0), qp_sqrt(length2)));
 }
 
-/* Turns (u,v) by rotation r, see plan_layout.h; exact, since u and v are multiples of 2^-24. */
+/* Coordinates, as frame_layout.h holds them. 1 - x: */
+QP_FUNCTION real QP_NAME(mirrored)(real x) {
+    return x == QP_R(0.5) ? x : -x;
+}
+/* Is x >= 1/2, or (upper_middle 0) x > 1/2? */
+QP_FUNCTION uint QP_NAME(is_upper)(real x, uint upper_middle) {
+    return signbit(x) != 0 || (upper_middle != 0 && x == QP_R(0.5));
+}
+/* 2x - upper: the place in that half of [0,1]. */
+QP_FUNCTION real QP_NAME(in_half)(real x, uint upper) {
+    const real t = QP_R(2.0) * fabs(x);
+    const real lower = t <= QP_R(0.5) ? t : -(QP_R(1.0) - t);
+    return upper != 0 ? QP_NAME(mirrored)(lower) : lower;
+}
+/* As a number in [0,1]; rounds numbers close to 1. */
+QP_FUNCTION real QP_NAME(plain)(real x) {
+    return signbit(x) != 0 ? QP_R(1.0) + x : x;
+}
+
+/* Turns (u,v) by rotation r, see plan_layout.h. */
 QP_FUNCTION void QP_NAME(rotate_uv)(uint r, real *u, real *v) {
     const real x = (r & 1u) != 0 ? *v : *u, y = (r & 1u) != 0 ? *u : *v;
-    *u = (r & 2u) != 0 ? QP_R(1.0) - x : x;
-    *v = ((r + 1u) & 2u) != 0 ? QP_R(1.0) - y : y;
+    *u = (r & 2u) != 0 ? QP_NAME(mirrored)(x) : x;
+    *v = ((r + 1u) & 2u) != 0 ? QP_NAME(mirrored)(y) : y;
+}
+
+/* Derivatives of one sample: from the leaf's frame to the patch's and the mesh's. With (a,b) the leaf's coordinates, rotation 1 is
+ * (a,b) = (v, 1-u), so that d/du = -d/db and d/dv = d/da; and so on around. A limit frame is turned but keeps its length. */
+QP_FUNCTION void QP_NAME(write_derivatives)(__global real *out, real4 da, real4 db, uint turn, real scale) {
+    const real4 u = (turn & 1u) != 0 ? db : da, v = (turn & 1u) != 0 ? da : db;
+    const real su = ((turn + 1u) & 2u) != 0 ? -scale : scale, sv = (turn & 2u) != 0 ? -scale : scale;
+    /* + 0 makes +0 of -0, so that a turn shows in no bit of a zero. */
+    out[0] = fma(u.x, su, QP_R(0.0));
+    out[1] = fma(u.y, su, QP_R(0.0));
+    out[2] = fma(u.z, su, QP_R(0.0));
+    out[3] = fma(v.x, sv, QP_R(0.0));
+    out[4] = fma(v.y, sv, QP_R(0.0));
+    out[5] = fma(v.z, sv, QP_R(0.0));
+}
+
+/* The same for the first `block` lanes of a leaf that is the whole patch. */
+QP_FUNCTION void QP_NAME(write_lane_derivatives)(__global real *derivatives, ulong i, uint block,
+                                                 __global const real *positions, uint turn,
+                                                 const lanes du[3], const lanes dv[3]) {
+    real slopes[6][QP_LANES];
+    for (uint c = 0; c < 3u; ++c) {
+        store_lanes(du[c], slopes[c]);
+        store_lanes(dv[c], slopes[3u + c]);
+    }
+    for (uint l = 0; l < block; ++l)
+        QP_NAME(write_derivatives)
+    (derivatives + 6u * (i + l), make4(slopes[0][l], slopes[1][l], slopes[2][l]),
+     make4(slopes[3][l], slopes[4][l], slopes[5][l]), turn, positions[QP_POSITION_SCALE]);
 }
 
 /* Writes QP_LANES samples, or the first `block` of them, from sample i on: their positions relative to origin, their
  * derivatives and flags. unit_normal() for lanes; those whose cross product is of no ordinary length go through
  * unit_normal() itself. */
 QP_FUNCTION void QP_NAME(write_samples)(__global real *vertices, __global uchar *flags, ulong i, uint block,
-                                        real4 origin, const lanes p[3], const lanes du[3], const lanes dv[3],
-                                        uint flag[QP_LANES]) {
+                                        __global const real *positions, real4 origin, const lanes p[3],
+                                        const lanes du[3], const lanes dv[3], uint flag[QP_LANES]) {
     lanes n[3];
     real result[6][QP_LANES];
     for (uint c = 0; c < 3u; ++c) {
@@ -122,9 +172,10 @@ QP_FUNCTION void QP_NAME(write_samples)(__global real *vertices, __global uchar 
     }
     const lanes length2 = fma_lanes(n[2], n[2], fma_lanes(n[1], n[1], mul_lanes(n[0], n[0])));
     const lanes inverse = div_lanes(splat(QP_R(1.0)), sqrt_lanes(length2));
-    store_lanes(add_lanes(splat(origin.x), p[0]), result[0]);
-    store_lanes(add_lanes(splat(origin.y), p[1]), result[1]);
-    store_lanes(add_lanes(splat(origin.z), p[2]), result[2]);
+    const lanes scale = splat(positions[QP_POSITION_SCALE]);
+    store_lanes(fma_lanes(add_lanes(splat(origin.x), p[0]), scale, splat(positions[0])), result[0]);
+    store_lanes(fma_lanes(add_lanes(splat(origin.y), p[1]), scale, splat(positions[1])), result[1]);
+    store_lanes(fma_lanes(add_lanes(splat(origin.z), p[2]), scale, splat(positions[2])), result[2]);
     for (uint c = 0; c < 3u; ++c) store_lanes(mul_lanes(n[c], inverse), result[3u + c]);
     if (!lanes_within(length2, QP_TINY, QP_HUGE)) {
         real slopes[6][QP_LANES];

@@ -13,11 +13,11 @@ typedef struct thresholds {
     double position, normal; /* infinite: none */
 } thresholds;
 
-static void print_place(qp_json *json, const char *key, uint32_t patch, float u, float v) {
+static void print_place(qp_json *json, const char *key, uint32_t patch, double u, double v) {
     qp_json_open_object(json, key);
     qp_json_integer(json, "patch", patch);
-    qp_json_real(json, "u", (double)u);
-    qp_json_real(json, "v", (double)v);
+    qp_json_real(json, "u", u);
+    qp_json_real(json, "v", v);
     qp_json_close(json);
 }
 
@@ -51,10 +51,9 @@ static void print_text(const char *name, const char *set, const cli_evaluation *
     printf("%s on %s, set %s: %" PRIu64 " samples\n", name, qp_device_name(evaluation->device), set,
            r->samples);
     printf("  position  max %.3e  rms %.3e  of the diagonal; worst at patch %" PRIu32 " (%.9g, %.9g)\n",
-           r->position_max, r->position_rms, r->worst_patch, (double)r->worst_u, (double)r->worst_v);
+           r->position_max, r->position_rms, r->worst_patch, r->worst_u, r->worst_v);
     printf("  normal    max %.3e  rms %.3e  degrees; worst at patch %" PRIu32 " (%.9g, %.9g)\n",
-           r->normal_max_deg, r->normal_rms_deg, r->worst_normal_patch, (double)r->worst_normal_u,
-           (double)r->worst_normal_v);
+           r->normal_max_deg, r->normal_rms_deg, r->worst_normal_patch, r->worst_normal_u, r->worst_normal_v);
     printf("  %" PRIu64 " not finite, %" PRIu64 " without a normal\n", r->nonfinite, r->normals_undefined);
     printf("  %" PRIu64 " with almost parallel tangents (sine < 0.01), left out above: normal max %.3e\n",
            r->normals_parallel, r->parallel_normal_max_deg);
@@ -69,13 +68,13 @@ static qp_status evaluate(const cli_evaluation *evaluation, const cli_evaluation
         qp_tessellation tessellation = {.spacing = (qp_spacing)o->spacing, .factor = (float)o->tess};
         qp_status status = qp_frame_eval(evaluation->frame, &tessellation, &stream, err);
         if (status != QP_OK) return status;
-        return qp_reference_compare(evaluation->mesh, &stream, report, err);
+        return qp_reference_compare(evaluation->mesh, &stream, NULL, report, err);
     }
     qp_sample_set points = {0};
     qp_status status = qp_sample_set_make(evaluation->mesh, set, samples, seed, &points, err);
     if (status == QP_OK)
         status = qp_frame_eval_points(evaluation->frame, points.count, points.patch, points.uv, &stream, err);
-    if (status == QP_OK) status = qp_reference_compare(evaluation->mesh, &stream, report, err);
+    if (status == QP_OK) status = qp_reference_compare(evaluation->mesh, &stream, points.uv, report, err);
     qp_sample_set_free(&points);
     return status;
 }

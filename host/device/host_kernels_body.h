@@ -34,11 +34,11 @@
     static void run_domain_##suffix(const qp_host_arg *a, size_t group) {                                    \
         domain_##suffix(a[0].memory, a[1].memory, a[2].memory, a[3].memory, a[4].memory, a[5].memory,        \
                         a[6].number, a[7].memory, a[8].memory, a[9].memory, a[10].memory, a[11].memory,      \
-                        group);                                                                              \
+                        a[12].memory, a[13].number, group);                                                                              \
     }                                                                                                        \
     static void run_regular_##suffix(const qp_host_arg *a, size_t group) {                                   \
         regular_##suffix(a[0].memory, a[1].memory, a[2].memory, a[3].number, a[4].memory, a[5].memory,       \
-                         a[6].memory, a[7].memory, group);                                                   \
+                         a[6].memory, a[7].memory, a[8].memory, a[9].number, group);                                                   \
     }
 
 QP_HOST_THUNKS(float)

@@ -129,10 +129,19 @@ static qp_status wrap_stream(qp_frame *frame, qp_error *err) {
     if (status == QP_OK)
         status = reserve_pages((void **)&frame->flags, &frame->flag_bytes, samples, "the vertex stream", err);
     if (status == QP_OK && frame->layout.order != NULL)
-        status = reserve_pages(&frame->ordered, &frame->ordered_bytes, samples * (sample_bytes + 1),
+        status = reserve_pages(&frame->ordered, &frame->ordered_bytes,
+                               samples * ((frame->options.want_derivatives ? 2 : 1) * sample_bytes + 1),
                                "the vertex stream", err);
+    if (status == QP_OK && frame->options.want_derivatives)
+        status = reserve_pages(&frame->derivatives, &frame->derivative_bytes, samples * sample_bytes,
+                               "derivatives", err);
     for (size_t b = 0; b < frame->n_batches && status == QP_OK; ++b) {
         qp_frame_batch *batch = &frame->batches[b];
+        if (frame->options.want_derivatives)
+            status = qp_buffer_wrap(frame->device, &batch->derivatives,
+                                    (char *)frame->derivatives + (size_t)batch->first_sample * sample_bytes,
+                                    (size_t)batch->n_samples * sample_bytes, "derivatives", err);
+        if (status != QP_OK) break;
         status = qp_buffer_wrap(frame->device, &batch->vertices,
                                 (char *)frame->vertices + (size_t)batch->first_sample * sample_bytes,
                                 (size_t)batch->n_samples * sample_bytes, "the vertex stream", err);
@@ -147,6 +156,24 @@ static qp_status upload(qp_frame *frame, qp_buffer *buffer, const void *from, si
                         qp_error *err) {
     qp_status status = qp_buffer_reserve(frame->device, buffer, bytes, what, err);
     return status == QP_OK ? qp_buffer_write(frame->device, buffer, from, bytes, err) : status;
+}
+
+/* Coordinates in the device's form, with the padding that whole blocks of lanes read. */
+static qp_status upload_grid(qp_frame *frame, qp_buffer *buffer, const double *from, size_t points,
+                             qp_error *err) {
+    const size_t count = points + QP_PADDING;
+    void *signs = qp_alloc(count, frame->real_size, true);
+    if (signs == NULL) return qp_fail_memory(err, count * frame->real_size, "tessellation grids");
+    for (size_t i = 0; i < points; ++i) {
+        const double s = qp_signed_coordinate(from[i], frame->options.precision);
+        if (frame->options.precision == QP_DOUBLE)
+            ((double *)signs)[i] = s;
+        else
+            ((float *)signs)[i] = (float)s;
+    }
+    qp_status status = upload(frame, buffer, signs, count * frame->real_size, "tessellation grids", err);
+    free(signs);
+    return status;
 }
 
 qp_status qp_frame_upload_layout(qp_frame *frame, qp_error *err) {
@@ -165,14 +192,13 @@ qp_status qp_frame_upload_layout(qp_frame *frame, qp_error *err) {
         begin = end;
     }
     if (status == QP_OK) status = write_entries(frame, &entries, ends, err);
-    const size_t grid_bytes = (layout->grid_points + QP_PADDING) * sizeof(float);
     if (status == QP_OK)
         status = upload(frame, &frame->entries, entries, layout->n_items * QP_ENTRY_WORDS * sizeof(uint32_t),
                         "the patches of a frame", err);
     if (status == QP_OK)
-        status = upload(frame, &frame->grid_u, layout->grid_u, grid_bytes, "tessellation grids", err);
+        status = upload_grid(frame, &frame->grid_u, layout->grid_u, layout->grid_points, err);
     if (status == QP_OK)
-        status = upload(frame, &frame->grid_v, layout->grid_v, grid_bytes, "tessellation grids", err);
+        status = upload_grid(frame, &frame->grid_v, layout->grid_v, layout->grid_points, err);
     if (status == QP_OK)
         status = qp_buffer_reserve(frame->device, &frame->support,
                                    (size_t)frame->peak_points * 4 * frame->real_size, "control points", err);
@@ -186,6 +212,7 @@ void qp_frame_drop_layout(qp_frame *frame) {
     for (size_t b = 0; b < frame->n_batches; ++b) {
         qp_buffer_free(frame->device, &frame->batches[b].vertices);
         qp_buffer_free(frame->device, &frame->batches[b].flags);
+        qp_buffer_free(frame->device, &frame->batches[b].derivatives);
     }
     free(frame->batches);
     frame->batches = NULL;

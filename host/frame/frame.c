@@ -58,28 +58,31 @@ static qp_status upload_plans(qp_frame *frame, qp_error *err) {
     return status;
 }
 
+static void put_real(const qp_frame *frame, void *reals, size_t i, double x) {
+    if (frame->options.precision == QP_FLOAT)
+        ((float *)reals)[i] = (float)x;
+    else
+        ((double *)reals)[i] = x;
+}
+
 qp_status qp_frame_update_positions(qp_frame *frame, qp_error *err) {
     const qp_mesh *mesh = frame->surface->mesh;
-    const size_t count = 3 * (size_t)mesh->n_vertices;
-    void *rounded = qp_alloc(count, frame->real_size, false);
-    if (rounded == NULL) return qp_fail_memory(err, count * frame->real_size, "positions");
-    qp_status status = QP_OK;
+    const size_t count = 3 * (size_t)mesh->n_vertices, reals = QP_POSITION_FIRST + count;
     for (size_t i = 0; i < count; ++i) {
-        const double x = mesh->positions[i];
-        const bool is_float = frame->options.precision == QP_FLOAT;
-        if (!isfinite(is_float ? (double)(float)x : x)) {
-            status = qp_fail(err, QP_BAD_INPUT, "position %g of vertex %zu is out of the range of %s", x,
-                             i / 3, is_float ? "float" : "double");
-            break;
-        }
-        if (is_float)
-            ((float *)rounded)[i] = (float)x;
-        else
-            ((double *)rounded)[i] = x;
+        if (!(fabs(mesh->positions[i]) <= QP_COORDINATE_LIMIT))
+            return qp_fail(err, QP_BAD_INPUT, "position %g of vertex %zu is not within %g of the origin",
+                           mesh->positions[i], i / 3, QP_COORDINATE_LIMIT);
     }
-    if (status == QP_OK)
-        status = upload(frame, &frame->positions, rounded, count * frame->real_size, "positions", err);
-    free(rounded);
+    void *local = qp_alloc(reals, frame->real_size, false);
+    if (local == NULL) return qp_fail_memory(err, reals * frame->real_size, "positions");
+    const qp_local_frame f = qp_mesh_local_frame(mesh);
+    for (size_t axis = 0; axis < 3; ++axis) put_real(frame, local, QP_POSITION_CENTRE + axis, f.centre[axis]);
+    put_real(frame, local, QP_POSITION_SCALE, ldexp(1.0, f.exponent));
+    for (size_t i = 0; i < count; ++i)
+        put_real(frame, local, QP_POSITION_FIRST + i,
+                 ldexp(mesh->positions[i] - f.centre[i % 3], -f.exponent));
+    qp_status status = upload(frame, &frame->positions, local, reals * frame->real_size, "positions", err);
+    free(local);
     return status;
 }
 
@@ -117,27 +120,35 @@ void qp_frame_free(qp_frame *frame) {
     free(frame->patch_factors);
     free(frame->vertices);
     free(frame->flags);
+    free(frame->derivatives);
     free(frame->ordered);
     free(frame);
 }
 
 /* Starts the kernels of every batch. */
 static qp_status launch_batches(qp_frame *frame, double *hull_ms, double *domain_ms, qp_error *err) {
+    const uint32_t want = frame->options.want_derivatives != 0;
     qp_status status = QP_OK;
     for (size_t b = 0; b < frame->n_batches && status == QP_OK; ++b) {
         qp_frame_batch *batch = &frame->batches[b];
         status = qp_buffer_unmap(frame->device, &batch->vertices, err);
         if (status == QP_OK) status = qp_buffer_unmap(frame->device, &batch->flags, err);
+        if (status == QP_OK) status = qp_buffer_unmap(frame->device, &batch->derivatives, err);
+        /* Any buffer will do where none is written. */
+        const qp_buffer *derivatives = want != 0 ? &batch->derivatives : &batch->vertices;
         const qp_arg hull[] = {{&frame->heads, 0},     {&frame->reals, 0},   {&frame->rings, 0},
                                {&frame->positions, 0}, {&frame->entries, 0}, {NULL, batch->first_general},
                                {&frame->support, 0}};
-        const qp_arg domain[] = {{&frame->heads, 0},           {&frame->trees, 0},     {&frame->reals, 0},
-                                 {&frame->rings, 0},           {&frame->positions, 0}, {&frame->entries, 0},
-                                 {NULL, batch->first_general}, {&frame->support, 0},   {&frame->grid_u, 0},
-                                 {&frame->grid_v, 0},          {&batch->vertices, 0},  {&batch->flags, 0}};
-        const qp_arg regular[] = {{&frame->rings, 0},           {&frame->positions, 0}, {&frame->entries, 0},
-                                  {NULL, batch->first_regular}, {&frame->grid_u, 0},    {&frame->grid_v, 0},
-                                  {&batch->vertices, 0},        {&batch->flags, 0}};
+        const qp_arg domain[] = {
+            {&frame->heads, 0},     {&frame->trees, 0},   {&frame->reals, 0},           {&frame->rings, 0},
+            {&frame->positions, 0}, {&frame->entries, 0}, {NULL, batch->first_general}, {&frame->support, 0},
+            {&frame->grid_u, 0},    {&frame->grid_v, 0},  {&batch->vertices, 0},        {&batch->flags, 0},
+            {derivatives, 0},       {NULL, want}};
+        const qp_arg regular[] = {{&frame->rings, 0},    {&frame->positions, 0},
+                                  {&frame->entries, 0},  {NULL, batch->first_regular},
+                                  {&frame->grid_u, 0},   {&frame->grid_v, 0},
+                                  {&batch->vertices, 0}, {&batch->flags, 0},
+                                  {derivatives, 0},      {NULL, want}};
         if (status == QP_OK)
             status = qp_launch(frame->device, &frame->program, QP_KERNEL_HULL, hull,
                                sizeof hull / sizeof hull[0], batch->n_general, hull_ms, err);
@@ -159,12 +170,17 @@ typedef struct order_job {
 static void order_samples(void *context, size_t begin, size_t end, unsigned worker) {
     const order_job *job = context;
     const qp_frame *frame = job->frame;
-    char *vertices = frame->ordered, *flags = vertices + frame->layout.n_samples * job->sample_bytes;
+    char *vertices = frame->ordered, *derivatives = vertices + frame->layout.n_samples * job->sample_bytes;
+    const bool want = frame->options.want_derivatives != 0;
+    char *flags = derivatives + (want ? frame->layout.n_samples * job->sample_bytes : 0);
     (void)worker;
     for (size_t i = begin; i < end; ++i) {
         const size_t at = (size_t)frame->layout.order[i];
         memcpy(vertices + i * job->sample_bytes, (const char *)frame->vertices + at * job->sample_bytes,
                job->sample_bytes);
+        if (want)
+            memcpy(derivatives + i * job->sample_bytes,
+                   (const char *)frame->derivatives + at * job->sample_bytes, job->sample_bytes);
         flags[i] = (char)frame->flags[at];
     }
 }
@@ -204,6 +220,7 @@ static qp_status evaluate(qp_frame *frame, qp_stream *stream, qp_error *err) {
     *stream = (qp_stream){.precision = frame->options.precision,
                           .n_samples = layout->n_samples,
                           .vertices = frame->vertices,
+                          .derivatives = frame->options.want_derivatives ? frame->derivatives : NULL,
                           .flags = frame->flags,
                           .uv = layout->uv,
                           .sample_patch = layout->sample_patch,
@@ -219,12 +236,19 @@ static qp_status evaluate(qp_frame *frame, qp_stream *stream, qp_error *err) {
     for (size_t b = 0; b < frame->n_batches && status == QP_OK; ++b) {
         status = qp_buffer_map(frame->device, &frame->batches[b].vertices, err);
         if (status == QP_OK) status = qp_buffer_map(frame->device, &frame->batches[b].flags, err);
+        if (status == QP_OK && frame->options.want_derivatives)
+            status = qp_buffer_map(frame->device, &frame->batches[b].derivatives, err);
     }
     if (status == QP_OK && layout->order != NULL) {
         order_job job = {frame, sample_bytes};
         qp_parallel((size_t)layout->n_samples, 4096, order_samples, &job);
         stream->vertices = frame->ordered;
-        stream->flags = (const uint8_t *)frame->ordered + layout->n_samples * sample_bytes;
+        const char *after = (const char *)frame->ordered + layout->n_samples * sample_bytes;
+        if (frame->options.want_derivatives) {
+            stream->derivatives = after;
+            after += layout->n_samples * sample_bytes;
+        }
+        stream->flags = (const uint8_t *)after;
     }
     stream->frame_ms = qp_now_ms() - start;
     if (status == QP_OK && frame->options.want_hash)
@@ -275,7 +299,7 @@ qp_status qp_frame_eval(qp_frame *frame, const qp_tessellation *tessellation, qp
     return evaluate(frame, stream, err);
 }
 
-qp_status qp_frame_eval_points(qp_frame *frame, uint64_t count, const uint32_t *patch, const float *uv,
+qp_status qp_frame_eval_points(qp_frame *frame, uint64_t count, const uint32_t *patch, const double *uv,
                                qp_stream *stream, qp_error *err) {
     *stream = (qp_stream){0};
     qp_frame_drop_layout(frame);

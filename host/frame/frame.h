@@ -5,6 +5,8 @@
 #include "host/device/device.h"
 #include "host/plan/plan.h"
 
+#include <math.h>
+
 /* Samples of one patch, evaluated by one work-group. */
 typedef struct qp_frame_item {
     uint32_t patch, samples;
@@ -19,7 +21,7 @@ typedef struct qp_frame_layout {
     size_t n_items;
     qp_frame_item *items;
     size_t grid_points;
-    float *grid_u, *grid_v; /* [grid_points + QP_PADDING] */
+    double *grid_u, *grid_v; /* [grid_points] in [0,1]; upload turns them into signed coordinates */
     uint64_t n_samples, n_triangles;
     float *uv;              /* [2 * n_samples] */
     uint32_t *sample_patch; /* [n_samples] */
@@ -33,7 +35,7 @@ qp_status qp_layout_tessellate(const qp_surface *surface, const qp_tessellation 
                                bool want_triangles, qp_frame_layout *layout, qp_error *err);
 /* Any points, grouped by patch. Errors: QP_BAD_INPUT names the first point that is none of a patch with a
  * surface. */
-qp_status qp_layout_points(const qp_surface *surface, uint64_t count, const uint32_t *patch, const float *uv,
+qp_status qp_layout_points(const qp_surface *surface, uint64_t count, const uint32_t *patch, const double *uv,
                            qp_frame_layout *layout, qp_error *err);
 void qp_layout_free(qp_frame_layout *layout);
 
@@ -43,7 +45,7 @@ typedef struct qp_frame_batch {
     uint64_t first_sample, n_samples;
     uint32_t first_general, n_general, first_regular, n_regular; /* entries */
     uint64_t points;                                             /* control points, all held at once */
-    qp_buffer vertices, flags;
+    qp_buffer vertices, flags, derivatives;
 } qp_frame_batch;
 
 struct qp_frame {
@@ -67,7 +69,9 @@ struct qp_frame {
     size_t vertex_bytes;
     uint8_t *flags;
     size_t flag_bytes;
-    void *ordered; /* vertices and flags in the caller's order, where that differs */
+    void *derivatives;
+    size_t derivative_bytes;
+    void *ordered; /* vertices, derivatives and flags in the caller's order, where that differs */
     size_t ordered_bytes;
 };
 
@@ -75,6 +79,14 @@ struct qp_frame {
 qp_status qp_frame_upload_layout(qp_frame *frame, qp_error *err);
 /* Frees what qp_frame_upload_layout made, buffers that can be used again apart. */
 void qp_frame_drop_layout(qp_frame *frame);
+
+/* A coordinate in [0,1] as the device holds it (kernels/frame_layout.h), in the frame's precision: by the distance to the nearer
+ * end, with the sign bit set for 1. */
+static inline double qp_signed_coordinate(double x, qp_precision precision) {
+    double s = x <= 0.5 ? x : -(1.0 - x);
+    if (precision == QP_FLOAT) s = (double)(float)s;
+    return s == -0.5 ? 0.5 : s;
+}
 
 /* Is this patch evaluated by the fast pass? */
 static inline bool qp_frame_is_fast(const qp_frame *frame, uint32_t patch) {

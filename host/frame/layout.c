@@ -174,16 +174,16 @@ static void fill_items(void *context, size_t begin, size_t end, unsigned worker)
 static qp_status alloc_layout(qp_frame_layout *layout, bool want_triangles, qp_error *err) {
     if (layout->n_samples > SIZE_MAX / 64 || layout->n_triangles > SIZE_MAX / 64)
         return qp_fail_memory(err, SIZE_MAX, "the vertex stream");
-    const size_t samples = (size_t)layout->n_samples, points = layout->grid_points + QP_PADDING;
+    const size_t samples = (size_t)layout->n_samples, points = layout->grid_points;
     layout->uv = qp_alloc(samples, 2 * sizeof(float), false);
     layout->sample_patch = qp_alloc(samples, sizeof(uint32_t), false);
-    layout->grid_u = qp_alloc(points, sizeof(float), true);
-    layout->grid_v = qp_alloc(points, sizeof(float), true);
+    layout->grid_u = qp_alloc(points, sizeof(double), false);
+    layout->grid_v = qp_alloc(points, sizeof(double), false);
     if (want_triangles)
         layout->triangles = qp_alloc((size_t)layout->n_triangles, 3 * sizeof(uint32_t), false);
     if (layout->uv == NULL || layout->sample_patch == NULL || layout->grid_u == NULL ||
         layout->grid_v == NULL || (want_triangles && layout->triangles == NULL))
-        return qp_fail_memory(err, samples * 12 + points * 8 + (size_t)layout->n_triangles * 12,
+        return qp_fail_memory(err, samples * 12 + points * 16 + (size_t)layout->n_triangles * 12,
                               "the vertex stream");
     return QP_OK;
 }
@@ -227,8 +227,8 @@ static qp_status expand(const qp_mesh *mesh, const uint32_t *patch_grid, const q
     if (status != QP_OK) goto done;
     for (size_t g = 0; g < n_grids; ++g) {
         for (size_t i = 0; i < grids[g].n_points; ++i) {
-            layout->grid_u[grid_first[g] + i] = grids[g].uv[2 * i];
-            layout->grid_v[grid_first[g] + i] = grids[g].uv[2 * i + 1];
+            layout->grid_u[grid_first[g] + i] = (double)grids[g].uv[2 * i];
+            layout->grid_v[grid_first[g] + i] = (double)grids[g].uv[2 * i + 1];
         }
     }
     fill_job job = {layout, grids, item_grid, item_triangle};
@@ -288,24 +288,17 @@ void qp_layout_free(qp_frame_layout *layout) {
 /* Samples an item may have; a patch with more takes several. */
 enum { ITEM_SAMPLES = 1 << 16 };
 
-static bool is_coordinate(float x) {
-    if (!(x >= 0 && x <= 1)) return false;
-    float scaled = x * 16777216.0f;
-    return scaled == floorf(scaled);
-}
-
 static qp_status check_points(const qp_surface *surface, uint64_t count, const uint32_t *patch,
-                              const float *uv, qp_error *err) {
+                              const double *uv, qp_error *err) {
     for (uint64_t i = 0; i < count; ++i) {
         const unsigned long long at = i;
         if (patch[i] >= surface->mesh->n_patches)
             return qp_fail(err, QP_BAD_INPUT, "point %llu: there is no patch %u", at, patch[i]);
         if (surface->patch_plan[patch[i]] == QP_NONE)
             return qp_fail(err, QP_BAD_INPUT, "point %llu: patch %u is a hole", at, patch[i]);
-        if (!is_coordinate(uv[2 * i]) || !is_coordinate(uv[2 * i + 1]))
-            return qp_fail(err, QP_BAD_INPUT,
-                           "point %llu: (%.9g, %.9g) is not made of multiples of 2^-24 in [0, 1]", at,
-                           (double)uv[2 * i], (double)uv[2 * i + 1]);
+        const double u = uv[2 * i], v = uv[2 * i + 1];
+        if (!(u >= 0 && u <= 1 && v >= 0 && v <= 1))
+            return qp_fail(err, QP_BAD_INPUT, "point %llu: (%.9g, %.9g) is not in [0, 1] x [0, 1]", at, u, v);
     }
     return QP_OK;
 }
@@ -321,7 +314,7 @@ static void cut_into_items(uint32_t n_patches, const uint64_t *first, qp_frame_l
     }
 }
 
-qp_status qp_layout_points(const qp_surface *surface, uint64_t count, const uint32_t *patch, const float *uv,
+qp_status qp_layout_points(const qp_surface *surface, uint64_t count, const uint32_t *patch, const double *uv,
                            qp_frame_layout *layout, qp_error *err) {
     const uint32_t n_patches = surface->mesh->n_patches;
     *layout = (qp_frame_layout){0};
@@ -344,7 +337,7 @@ qp_status qp_layout_points(const qp_surface *surface, uint64_t count, const uint
         return status;
     }
     if (count != 0) { /* the caller's arrays may be NULL */
-        memcpy(layout->uv, uv, (size_t)count * 2 * sizeof(float));
+        for (size_t i = 0; i < 2 * (size_t)count; ++i) layout->uv[i] = (float)uv[i];
         memcpy(layout->sample_patch, patch, (size_t)count * sizeof(uint32_t));
     }
     for (uint64_t i = 0; i < count; ++i) ++first[patch[i] + 2];

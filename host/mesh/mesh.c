@@ -1,5 +1,6 @@
 #include "host/mesh/mesh.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -41,6 +42,38 @@ uint32_t qp_mesh_face_count(const qp_mesh *mesh) {
 uint32_t qp_mesh_patch_count(const qp_mesh *mesh) {
     return mesh->n_patches;
 }
+qp_local_frame qp_mesh_local_frame(const qp_mesh *mesh) {
+    double low[3] = {0, 0, 0}, high[3] = {0, 0, 0}, extent = 0.0, farthest = 0.0;
+    qp_local_frame f = {{0, 0, 0}, 0};
+    for (size_t i = 0; i < 3 * (size_t)mesh->n_vertices; ++i) {
+        const double x = mesh->positions[i];
+        const size_t axis = i % 3;
+        if (i < 3 || x < low[axis]) low[axis] = x;
+        if (i < 3 || x > high[axis]) high[axis] = x;
+    }
+    for (size_t axis = 0; axis < 3; ++axis) extent = fmax(extent, high[axis] - low[axis]);
+    farthest = extent;
+    for (size_t axis = 0; axis < 3; ++axis) {
+        const double middle = low[axis] / 2 + high[axis] / 2;
+        if (fabs(middle) > 4 * extent)
+            f.centre[axis] = (double)(float)middle;
+        else
+            farthest = fmax(farthest, fmax(fabs(low[axis]), fabs(high[axis])));
+    }
+    if (farthest > 0.0) f.exponent = ilogb(farthest);
+    if (f.exponent < -100) f.exponent = -100;
+    if (f.exponent > 100) f.exponent = 100;
+    return f;
+}
+
+uint32_t qp_mesh_edge_count(const qp_mesh *mesh) {
+    return mesh->n_edges;
+}
+
+const uint32_t *qp_mesh_edge_vertices(const qp_mesh *mesh) {
+    return mesh->edge_vertices;
+}
+
 const double *qp_mesh_positions(const qp_mesh *mesh) {
     return mesh->positions;
 }

@@ -15,8 +15,8 @@
 
 #include "host/base/status.h"
 
-/* Coordinates beyond this are refused, so that products of two of them still fit in a float. */
-#define QP_COORDINATE_LIMIT 1e18
+/* Coordinates beyond this are refused, so that sums and differences of them still fit in a float. */
+#define QP_COORDINATE_LIMIT 1e36
 
 enum { QP_EDGE_BOUNDARY = 1, QP_EDGE_NONMANIFOLD = 2 };
 enum {
@@ -68,6 +68,15 @@ struct qp_mesh {
     double box_min[3], box_max[3]; /* of used vertices */
     double diagonal;               /* of that box; 1 when it is a point, so that ratios stay finite */
 };
+
+/* The frame in which a device holds the positions, as they are now: (x - centre) / 2^exponent. An axis is centred where the mesh
+ * lies more than four of its extents away from 0: the difference is then exact (Sterbenz), so that no digits are lost which x
+ * itself still holds; elsewhere centre is 0 and nothing changes but the exponent. */
+typedef struct qp_local_frame {
+    double centre[3]; /* numbers of float */
+    int exponent;     /* -100 to 100, so that the scale is a normal number of float */
+} qp_local_frame;
+qp_local_frame qp_mesh_local_frame(const qp_mesh *mesh);
 
 static inline uint32_t qp_face_size(const qp_mesh *m, uint32_t face) {
     return m->face_offsets[face + 1] - m->face_offsets[face];

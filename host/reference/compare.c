@@ -28,6 +28,7 @@ typedef struct worker_state {
 typedef struct compare {
     const qp_mesh *mesh;
     const qp_stream *stream;
+    const double *uv; /* or NULL: the stream's */
     const double *positions;
     uint64_t *first, *order; /* samples of patch p: order[first[p] .. first[p + 1]) */
     partial *partials;
@@ -40,6 +41,11 @@ static void read_vertex(const qp_stream *stream, uint64_t i, double out[6]) {
                                                : ((const double *)stream->vertices)[6 * i + c];
 }
 
+static void read_uv(const compare *c, uint64_t i, double uv[2]) {
+    for (uint64_t k = 0; k < 2; ++k)
+        uv[k] = c->uv != NULL ? c->uv[2 * i + k] : (double)c->stream->uv[2 * i + k];
+}
+
 /* Degrees between two directions, accurate when small; 180 when a is no direction at all. */
 static double angle(const double a[3], const double b[3]) {
     double cross[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
@@ -49,7 +55,7 @@ static double angle(const double a[3], const double b[3]) {
            57.29577951308232;
 }
 
-static void measure_normal(const double *n, const qp_reference_sample *ref, uint32_t patch, const float *uv,
+static void measure_normal(const double *n, const qp_reference_sample *ref, uint32_t patch, const double *uv,
                            bool past, partial *to) {
     qp_error_report *r = &to->report;
     if (!ref->normal_defined) {
@@ -79,7 +85,8 @@ static void measure_normal(const double *n, const qp_reference_sample *ref, uint
 
 static void measure(const compare *c, uint64_t i, const qp_reference_sample *ref, partial *to) {
     qp_error_report *r = &to->report;
-    const float *uv = c->stream->uv + 2 * i;
+    double uv[2];
+    read_uv(c, i, uv);
     bool past = c->stream->flags[i] & QP_SAMPLE_PAST_DEPTH;
     double got[6], square = 0;
     read_vertex(c->stream, i, got);
@@ -115,8 +122,7 @@ static qp_status compare_patch(compare *c, uint32_t patch, unsigned worker, part
     if (!qp_grow((void **)&w->uv, &w->uv_capacity, 2 * count, sizeof *w->uv) ||
         !qp_grow((void **)&w->samples, &w->sample_capacity, count, sizeof *w->samples))
         return qp_fail_memory(&w->error, count * sizeof *w->samples, "the samples of a patch");
-    for (uint64_t i = 0; i < 2 * count; ++i)
-        w->uv[i] = (double)c->stream->uv[2 * c->order[begin + i / 2] + i % 2];
+    for (uint64_t i = 0; i < count; ++i) read_uv(c, c->order[begin + i], w->uv + 2 * i);
     qp_status status =
         qp_reference_eval_with(&w->work, c->mesh, c->positions, patch, count, w->uv, w->samples, &w->error);
     for (uint64_t i = 0; i < count && !status; ++i) measure(c, c->order[begin + i], &w->samples[i], to);
@@ -198,16 +204,21 @@ static qp_status run(compare *c, unsigned n_workers, qp_error_report *report, qp
 static double *rounded_positions(const qp_mesh *mesh) {
     size_t n = 3 * (size_t)mesh->n_vertices;
     double *to = qp_alloc(n, sizeof *to, false);
-    for (size_t i = 0; to && i < n; ++i) to[i] = (double)(float)mesh->positions[i];
+    const qp_local_frame f = qp_mesh_local_frame(mesh);
+    for (size_t i = 0; to && i < n; ++i) {
+        const float local = (float)ldexp(mesh->positions[i] - f.centre[i % 3], -f.exponent);
+        to[i] = f.centre[i % 3] + ldexp((double)local, f.exponent);
+    }
     return to;
 }
 
-qp_status qp_reference_compare(const qp_mesh *mesh, const qp_stream *stream, qp_error_report *report,
-                               qp_error *err) {
+qp_status qp_reference_compare(const qp_mesh *mesh, const qp_stream *stream, const double *uv,
+                               qp_error_report *report, qp_error *err) {
     unsigned n_workers = qp_thread_count();
     double *rounded = stream->precision == QP_FLOAT ? rounded_positions(mesh) : NULL;
     compare c = {.mesh = mesh,
                  .stream = stream,
+                 .uv = uv,
                  .positions = rounded ? rounded : mesh->positions,
                  .first = qp_alloc((size_t)mesh->n_patches + 1, sizeof(uint64_t), true),
                  .order = qp_alloc(stream->n_samples, sizeof(uint64_t), false),

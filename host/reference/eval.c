@@ -21,11 +21,30 @@ typedef struct visit {
     qp_error *err;
 } visit;
 
-/* A cell: a quad of a level's mesh, its samples order[begin..end). */
+/* A cell: a quad of a level's mesh, its samples order[begin..end). Each mesh is relative to an origin of its own, a vertex
+ * of it, so that its points keep their digits however small the cells are and however far from 0. */
 typedef struct cell {
     uint32_t level, mesh, face;
     uint32_t begin, end;
+    qp_quad origin[3];
 } cell;
+
+/* Moves the origin of a mesh to its vertex 0; *origin was its origin and becomes the new one. */
+static void recenter(qp_piece *mesh, qp_quad origin[3]) {
+    qp_quad by[3];
+    memcpy(by, mesh->vertices[0].p, sizeof by);
+    for (uint32_t v = 0; v < mesh->n_vertices; ++v)
+        for (int c = 0; c < 3; ++c) mesh->vertices[v].p[c] -= by[c];
+    for (int c = 0; c < 3; ++c) origin[c] += by[c];
+}
+
+static void set_position(const cell *at, const qp_quad p[3], qp_reference_sample *s) {
+    for (int c = 0; c < 3; ++c) {
+        qp_quad x = at->origin[c] + p[c];
+        s->p[c] = (double)x;
+        s->p_rest[c] = (double)(x - s->p[c]);
+    }
+}
 
 /* Unit normal from the derivatives, when they are neither vanishing nor parallel. */
 static void set_normal(qp_reference_sample *s) {
@@ -47,8 +66,8 @@ static void eval_regular(const visit *t, const cell *at, const qp_leaf *leaf) {
         qp_quad p[3];
         qp_leaf_real du[3], dv[3];
         qp_leaf_eval(leaf, t->work->uv[2 * k], t->work->uv[2 * k + 1], p, du, dv);
+        set_position(at, p, s);
         for (int c = 0; c < 3; ++c) {
-            s->p[c] = (double)p[c];
             s->du[c] = (double)(du[c] * scale);
             s->dv[c] = (double)(dv[c] * scale);
         }
@@ -65,9 +84,9 @@ static qp_status eval_corner(const visit *t, const cell *at, uint32_t j, qp_refe
         qp_corner_eval(mesh, mesh->face_offsets[at->face] + j, &t->work->corner, &limit, t->err);
     if (status) return status;
     double scale = ldexp(1.0, (int)at->level);
+    set_position(at, limit.p, s);
     for (int c = 0; c < 3; ++c) {
         double next = limit.toward_next[c] * scale, prev = limit.toward_prev[c] * scale;
-        s->p[c] = (double)limit.p[c];
         s->du[c] = j == 0 ? next : j == 1 ? -prev : j == 2 ? -next : prev;
         s->dv[c] = j == 0 ? prev : j == 1 ? next : j == 2 ? -prev : -next;
     }
@@ -130,6 +149,9 @@ static qp_status descend(const visit *t, cell at) {
     const uint32_t *corners = mesh->corner_vertex + mesh->face_offsets[at.face];
     status = qp_piece_refine(mesh, corners, 4, &work->levels[at.mesh + 1], t->err);
     if (status) return status;
+    qp_quad origin[3];
+    memcpy(origin, at.origin, sizeof origin);
+    recenter(&work->levels[at.mesh + 1], origin);
     uint32_t children[4];
     memcpy(children, mesh->corner_child + mesh->face_offsets[at.face], sizeof children);
     uint32_t bounds[5] = {at.begin, 0, split(t, at.begin, at.end, 1), 0, at.end};
@@ -143,8 +165,13 @@ static qp_status descend(const visit *t, cell at) {
             uv[0] = 2 * uv[0] - (q & 1); /* exact */
             uv[1] = 2 * uv[1] - (q >> 1);
         }
-        status =
-            descend(t, (cell){at.level + 1, at.mesh + 1, children[quadrant[q]], bounds[q], bounds[q + 1]});
+        cell child = {.level = at.level + 1,
+                      .mesh = at.mesh + 1,
+                      .face = children[quadrant[q]],
+                      .begin = bounds[q],
+                      .end = bounds[q + 1]};
+        memcpy(child.origin, origin, sizeof origin);
+        status = descend(t, child);
     }
     return status;
 }
@@ -179,8 +206,9 @@ qp_status qp_reference_eval_with(qp_reference_work *work, const qp_mesh *mesh, c
     for (size_t i = 0; i < count; ++i) work->order[i] = (uint32_t)i;
 
     qp_piece *base = &work->levels[0];
-    cell root = {0, 0, 0, 0, (uint32_t)count};
+    cell root = {.end = (uint32_t)count};
     status = qp_piece_gather(mesh, positions, face, base, err);
+    if (!status) recenter(base, root.origin);
     if (!status && qp_piece_face_size(base, 0) != 4) {
         status =
             qp_piece_refine(base, base->corner_vertex, qp_piece_face_size(base, 0), &work->levels[1], err);

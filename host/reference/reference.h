@@ -10,6 +10,7 @@ typedef struct qp_reference_sample {
      * tangent plane, and are the one-sided derivatives where those are finite and not zero, else tangents of
      * any length (often 0) where there is no tangent plane. */
     double p[3], du[3], dv[3];
+    double p_rest[3];    /* what rounding took from p: p + p_rest has twice the digits */
     double n[3];         /* unit normal, or 0 where undefined */
     bool normal_defined; /* false where the surface has no tangent plane, or it is too ill-conditioned to tell
                           */
@@ -32,9 +33,9 @@ typedef struct qp_error_report {
     double position_max, position_rms; /* of the bounding box diagonal */
     double normal_max_deg, normal_rms_deg;
     uint32_t worst_patch;
-    float worst_u, worst_v; /* of position_max */
+    double worst_u, worst_v; /* of position_max */
     uint32_t worst_normal_patch;
-    float worst_normal_u, worst_normal_v;
+    double worst_normal_u, worst_normal_v;
     double past_position_max; /* of the samples past depth, which the maxima above leave out */
     double past_normal_max_deg;
 } qp_error_report;
@@ -42,11 +43,12 @@ typedef struct qp_error_report {
 /* Compares a vertex stream with the reference, in parallel over patches; the report is the same for any
  * number of threads. Samples flagged QP_SAMPLE_PAST_DEPTH are counted apart. Float streams are compared with
  * the surface of the positions rounded to float, which is what the kernels were given, double streams with
- * that of the positions themselves. A sample that has no normal where the reference has one counts as 180
+ * that of the positions themselves. uv: the points where the stream was evaluated, 2 a sample; NULL: stream->uv, which holds the
+ * tessellator's points in full. A sample that has no normal where the reference has one counts as 180
  * degrees off; samples that are not finite are counted and left out of the measures. QP_BAD_INPUT when a
  * sample lies on a patch without surface or outside [0,1]^2. */
-qp_status qp_reference_compare(const qp_mesh *mesh, const qp_stream *stream, qp_error_report *report,
-                               qp_error *err);
+qp_status qp_reference_compare(const qp_mesh *mesh, const qp_stream *stream, const double *uv,
+                               qp_error_report *report, qp_error *err);
 
 /* Sample sets. Arrays are malloced for the caller; nothing is held on failure. kind "corner": (u,v) in
  * {0, 2^-k} offsets about every corner of every patch with a surface, k = 1..24 (count and seed are not
@@ -55,7 +57,7 @@ qp_status qp_reference_compare(const qp_mesh *mesh, const qp_stream *stream, qp_
 typedef struct qp_sample_set {
     uint64_t count;
     uint32_t *patch;
-    float *uv;
+    double *uv;
 } qp_sample_set;
 qp_status qp_sample_set_make(const qp_mesh *mesh, const char *kind, uint64_t count, uint64_t seed,
                              qp_sample_set *set, qp_error *err);

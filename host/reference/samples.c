@@ -19,15 +19,15 @@ static qp_status reserve(qp_sample_set *set, uint64_t count, qp_error *err) {
     set->uv = qp_alloc(count, 2 * sizeof *set->uv, false);
     if (!set->patch || !set->uv) {
         qp_sample_set_free(set);
-        return qp_fail_memory(err, count * 12, "a sample set");
+        return qp_fail_memory(err, count * 20, "a sample set");
     }
     return QP_OK;
 }
 
 static void append(qp_sample_set *set, uint32_t patch, double u, double v) {
     set->patch[set->count] = patch;
-    set->uv[2 * set->count] = (float)u;
-    set->uv[2 * set->count + 1] = (float)v;
+    set->uv[2 * set->count] = u;
+    set->uv[2 * set->count + 1] = v;
     set->count++;
 }
 

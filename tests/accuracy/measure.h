@@ -25,7 +25,7 @@ static inline int measure(const qp_surface *surface, qp_device *device, qp_preci
             CHECK_OK(qp_sample_set_make(surface->mesh, set, samples, seed, &points, &err), err) &&
             CHECK_OK(qp_frame_eval_points(frame, points.count, points.patch, points.uv, &stream, &err), err);
     }
-    good = good && CHECK_OK(qp_reference_compare(surface->mesh, &stream, report, &err), err);
+    good = good && CHECK_OK(qp_reference_compare(surface->mesh, &stream, points.uv, report, &err), err);
     qp_sample_set_free(&points);
     qp_frame_free(frame);
     return good;

@@ -86,7 +86,7 @@ static inline void hand_end(hand_plan *h, uint32_t flags) {
 
 /* Evaluates count points; the caller frees *frame, which owns the stream. */
 static inline int hand_eval(qp_device *device, const hand_plan *h, qp_precision precision,
-                            int no_regular_pass, uint64_t count, const uint32_t *patch, const float *uv,
+                            int no_regular_pass, uint64_t count, const uint32_t *patch, const double *uv,
                             qp_frame **frame, qp_stream *stream) {
     qp_error err = {0};
     qp_frame_options options = {.precision = precision, .want_hash = 1, .no_regular_pass = no_regular_pass};

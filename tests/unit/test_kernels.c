@@ -132,13 +132,13 @@ static void polynomial(wide u, wide v, wide p[3], wide n[3]) {
 
 enum { SAMPLES = 4000 };
 static uint32_t patches[SAMPLES];
-static float uvs[2 * SAMPLES];
+static double uvs[2 * SAMPLES];
 
 static void scatter(void) {
     for (int i = 0; i < SAMPLES; ++i) {
         patches[i] = (uint32_t)((hand_random() + 1) * 2) % 4;
-        uvs[2 * i] = hand_coordinate();
-        uvs[2 * i + 1] = hand_coordinate();
+        uvs[2 * i] = (double)hand_coordinate();
+        uvs[2 * i + 1] = (double)hand_coordinate();
     }
 }
 
@@ -257,8 +257,8 @@ static void test_tree(qp_device *host, qp_device *opencl, uint32_t rotation) {
                             {0, 0.5f},    {0, 1},    {0.25f, 0.75f}, {0, 0}};
     for (int i = 0; i < 8; ++i) {
         patches[i] = 0;
-        uvs[2 * i] = at[i][0];
-        uvs[2 * i + 1] = at[i][1];
+        uvs[2 * i] = (double)at[i][0];
+        uvs[2 * i + 1] = (double)at[i][1];
     }
     run_both(host, opencl, 1);
     qp_frame *frame = NULL;
@@ -304,8 +304,8 @@ static void test_ties(qp_device *host, qp_device *opencl) {
         const float at[5][2] = {{0.5f, 0.25f}, {0.5f, 0.75f}, {0.25f, 0.5f}, {0.75f, 0.5f}, {0.5f, 0.5f}};
         for (int i = 0; i < 5; ++i) {
             patches[i] = 0;
-            uvs[2 * i] = at[i][0];
-            uvs[2 * i + 1] = at[i][1];
+            uvs[2 * i] = (double)at[i][0];
+            uvs[2 * i + 1] = (double)at[i][1];
         }
         run_both(host, opencl, 0);
         qp_frame *frame = NULL;

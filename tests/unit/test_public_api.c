@@ -39,7 +39,7 @@ static void test_cube(qp_device *device) {
     qp_stream stream;
     qp_frame_options options;
     const uint32_t patch[4] = {0, 0, 0, 1};
-    const float uv[8] = {0, 0, 0.5f, 0.5f, 1, 1, 0.5f, 0.5f};
+    const double uv[8] = {0, 0, 0.5, 0.5, 1, 1, 0.5, 0.5};
     const double *p;
     memset(&options, 0, sizeof options);
     options.precision = QP_DOUBLE;

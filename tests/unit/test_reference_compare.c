@@ -29,7 +29,7 @@ static bool make_stream(const qp_mesh *mesh, const char *kind, uint64_t count, m
     m->flags = qp_alloc(m->set.count, 1, true);
     if (!CHECK(m->vertices && m->flags)) return false;
     for (uint64_t i = 0; i < m->set.count; ++i) {
-        double uv[2] = {(double)m->set.uv[2 * i], (double)m->set.uv[2 * i + 1]};
+        const double *uv = m->set.uv + 2 * i;
         qp_reference_sample s;
         if (!CHECK_OK(qp_reference_eval(mesh, mesh->positions, m->set.patch[i], 1, uv, &s, &err), err))
             return false;
@@ -40,7 +40,6 @@ static bool make_stream(const qp_mesh *mesh, const char *kind, uint64_t count, m
                             .n_samples = m->set.count,
                             .vertices = m->vertices,
                             .flags = m->flags,
-                            .uv = m->set.uv,
                             .sample_patch = m->set.patch};
     return true;
 }
@@ -53,7 +52,7 @@ static void check_measures(const qp_mesh *mesh) {
         free_made(&m);
         return;
     }
-    CHECK_OK(qp_reference_compare(mesh, &m.stream, &r, &err), err);
+    CHECK_OK(qp_reference_compare(mesh, &m.stream, m.set.uv, &r, &err), err);
     CHECK(r.samples == 500 && r.past_depth == 0 && r.nonfinite == 0);
     CHECK_NEAR(r.position_max, 0, 1e-15);
     CHECK_NEAR(r.normal_max_deg, 0, 1e-9);
@@ -66,7 +65,7 @@ static void check_measures(const qp_mesh *mesh) {
     m.flags[40] = QP_SAMPLE_PAST_DEPTH;
     m.vertices[6 * 40 + 2] += mesh->diagonal;
     memset(&m.vertices[6 * 50 + 3], 0, 3 * sizeof(double));
-    CHECK_OK(qp_reference_compare(mesh, &m.stream, &r, &err), err);
+    CHECK_OK(qp_reference_compare(mesh, &m.stream, m.set.uv, &r, &err), err);
     CHECK(r.samples == 500 && r.past_depth == 1 && r.nonfinite == 1);
     CHECK_NEAR(r.position_max, 0.1, 1e-12);
     CHECK_NEAR(r.position_rms, 0.1 / sqrt(498), 1e-12);
@@ -77,15 +76,15 @@ static void check_measures(const qp_mesh *mesh) {
 
     qp_error_report again;
     setenv("QUADPLAN_THREADS", "1", 1);
-    CHECK_OK(qp_reference_compare(mesh, &m.stream, &again, &err), err);
+    CHECK_OK(qp_reference_compare(mesh, &m.stream, m.set.uv, &again, &err), err);
     unsetenv("QUADPLAN_THREADS");
     CHECK(again.position_rms == r.position_rms && again.normal_rms_deg == r.normal_rms_deg);
 
     m.set.patch[3] = mesh->n_patches;
-    CHECK(qp_reference_compare(mesh, &m.stream, &r, &err) == QP_BAD_INPUT);
+    CHECK(qp_reference_compare(mesh, &m.stream, m.set.uv, &r, &err) == QP_BAD_INPUT);
     m.set.patch[3] = 0;
     m.set.uv[6] = 2;
-    CHECK(qp_reference_compare(mesh, &m.stream, &r, &err) == QP_BAD_INPUT);
+    CHECK(qp_reference_compare(mesh, &m.stream, m.set.uv, &r, &err) == QP_BAD_INPUT);
     free_made(&m);
 }
 
@@ -111,7 +110,7 @@ static void check_float(const qp_mesh *mesh) {
         qp_error_report r;
         double square = 0;
         for (int c = 0; c < 3; ++c) square += ((double)vertex[c] - s.p[c]) * ((double)vertex[c] - s.p[c]);
-        CHECK_OK(qp_reference_compare(mesh, &stream, &r, &err), err);
+        CHECK_OK(qp_reference_compare(mesh, &stream, NULL, &r, &err), err);
         CHECK_NEAR(r.position_max, sqrt(square) / mesh->diagonal, 1e-15);
         CHECK_NEAR(r.normal_max_deg, 0, 1e-4);
     }
@@ -133,7 +132,7 @@ static void check_sets(const qp_mesh *mesh) {
         for (uint64_t i = 0; i < set.count; ++i) {
             visits[set.patch[i]]++;
             for (int c = 0; c < 2; ++c) {
-                double x = (double)set.uv[2 * i + c];
+                double x = set.uv[2 * i + c];
                 CHECK(x >= 0 && x < 1 && x * 0x1p24 == floor(x * 0x1p24));
             }
         }
@@ -143,11 +142,11 @@ static void check_sets(const qp_mesh *mesh) {
         qp_sample_set_free(&same);
     }
     if (CHECK_OK(qp_sample_set_make(mesh, "corner", 0, 0, &set, &err), err)) {
-        float least = 1;
+        double least = 1;
         CHECK(set.count == (uint64_t)n_patches * 4 * (1 + 3 * 24));
         for (uint64_t i = 0; i < 2 * set.count; ++i)
-            if (set.uv[i] > 0) least = fminf(least, set.uv[i]);
-        CHECK(least == 0x1p-24f);
+            if (set.uv[i] > 0) least = fmin(least, set.uv[i]);
+        CHECK(least == 0x1p-24);
         qp_sample_set_free(&set);
     }
     CHECK(qp_sample_set_make(mesh, "grid", 10, 0, &set, &err) == QP_BAD_INPUT);
