@@ -11,7 +11,8 @@ typedef struct cli_command {
     qp_status (*run)(int argc, char **argv, qp_error *err); /* argv[0] is the subcommand's name */
 } cli_command;
 
-extern const cli_command cli_info, cli_gen, cli_eval, cli_error, cli_render, cli_devices;
+extern const cli_command cli_info, cli_gen, cli_eval, cli_error, cli_sample, cli_stress, cli_render,
+    cli_devices;
 
 /* ---- Options (options.c) ---- */
 typedef enum cli_kind {

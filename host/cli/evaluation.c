@@ -10,7 +10,10 @@ qp_status cli_evaluation_open(const char *argument, const cli_evaluation_options
         .precision = (qp_precision)options->precision,
         .want_triangles = want_triangles,
         .want_hash = want_triangles,
+        .want_derivatives = options->derivatives,
         .no_regular_pass = options->no_regular_pass,
+        .no_sharing = options->no_sharing,
+        .no_exact_tail = options->no_exact_tail,
     };
     qp_status status = cli_mesh_open(argument, &options->mesh, &evaluation->mesh, err);
     if (status == QP_OK)

@@ -10,7 +10,8 @@ typedef struct cli_evaluation_options {
     int spacing, precision; /* indices into CLI_SPACINGS, CLI_PRECISIONS, which are the API's values */
     uint64_t depth;         /* 0: the library's default */
     const char *device;     /* NULL: the library's default */
-    bool no_regular_pass;
+    bool no_regular_pass, no_sharing, no_exact_tail;
+    bool derivatives; /* set by the subcommand */
 } cli_evaluation_options;
 
 #define CLI_EVALUATION_DEFAULTS                                                                              \
@@ -21,12 +22,19 @@ typedef struct cli_evaluation_options {
      CLI_REAL, &(o).tess, 1, 64, NULL},                                                                      \
     {"--spacing", CLI_SPACINGS, "of the tessellator (default equal)",                                        \
      CLI_CHOICE, &(o).spacing, 0, 0, NULL},                                                                  \
+    CLI_SAMPLING_OPTIONS(o)
+/* Those that any sampling takes. */
+#define CLI_SAMPLING_OPTIONS(o)                                                                              \
     {"--precision", CLI_PRECISIONS, "of stencils and kernels (default float)",                               \
      CLI_CHOICE, &(o).precision, 0, 0, NULL},                                                                \
     {"--depth", "N", "deepest subdivision level of the plans, 1 to 24 (default 10)",                         \
      CLI_COUNT, &(o).depth, 1, QP_DEPTH_LIMIT, NULL},                                                                    \
     {"--device", "D", "host, P.D, or part of a name, as `quadplan devices` lists them",                      \
      CLI_TEXT, &(o).device, 0, 0, NULL},                                                                     \
+    {"--no-exact-tail", NULL, "approximate below the plans' depth, and flag it, for comparison",             \
+     CLI_FLAG, &(o).no_exact_tail, 0, 0, NULL},                                                              \
+    {"--no-sharing", NULL, "every patch evaluates its own edges, for comparison",                            \
+     CLI_FLAG, &(o).no_sharing, 0, 0, NULL},                                                                 \
     {"--no-regular-pass", NULL, "evaluate regular patches by the general kernels, for comparison",           \
      CLI_FLAG, &(o).no_regular_pass, 0, 0, NULL},                                                            \
     CLI_MESH_OPTIONS((o).mesh)

@@ -4,8 +4,8 @@
 #include <errno.h>
 #include <string.h>
 
-static const cli_command *const commands[] = {&cli_info,  &cli_gen,    &cli_eval,
-                                              &cli_error, &cli_render, &cli_devices};
+static const cli_command *const commands[] = {&cli_info,   &cli_gen,    &cli_eval,   &cli_error,
+                                              &cli_sample, &cli_stress, &cli_render, &cli_devices};
 enum { N_COMMANDS = sizeof commands / sizeof commands[0] };
 
 static void usage(FILE *file) {
