@@ -28,7 +28,8 @@ typedef struct worker_state {
 typedef struct compare {
     const qp_mesh *mesh;
     const qp_stream *stream;
-    const double *uv; /* or NULL: the stream's */
+    const double *uv;                      /* or NULL: the stream's */
+    const qp_reference_sample *references; /* of every sample, or NULL: they are evaluated here */
     const double *positions;
     uint64_t *first, *order; /* samples of patch p: order[first[p] .. first[p + 1]) */
     partial *partials;
@@ -119,6 +120,11 @@ static qp_status compare_patch(compare *c, uint32_t patch, unsigned worker, part
     worker_state *w = &c->workers[worker];
     uint64_t begin = c->first[patch], count = c->first[patch + 1] - begin;
     if (count == 0) return QP_OK;
+    if (c->references != NULL) {
+        for (uint64_t i = begin; i < begin + count; ++i)
+            measure(c, c->order[i], &c->references[c->order[i]], to);
+        return QP_OK;
+    }
     if (!qp_grow((void **)&w->uv, &w->uv_capacity, 2 * count, sizeof *w->uv) ||
         !qp_grow((void **)&w->samples, &w->sample_capacity, count, sizeof *w->samples))
         return qp_fail_memory(&w->error, count * sizeof *w->samples, "the samples of a patch");
@@ -201,7 +207,7 @@ static qp_status run(compare *c, unsigned n_workers, qp_error_report *report, qp
 }
 
 /* Positions as the kernels were given them. */
-static double *rounded_positions(const qp_mesh *mesh) {
+double *qp_reference_rounded_positions(const qp_mesh *mesh) {
     size_t n = 3 * (size_t)mesh->n_vertices;
     double *to = qp_alloc(n, sizeof *to, false);
     const qp_local_frame f = qp_mesh_local_frame(mesh);
@@ -212,13 +218,16 @@ static double *rounded_positions(const qp_mesh *mesh) {
     return to;
 }
 
-qp_status qp_reference_compare(const qp_mesh *mesh, const qp_stream *stream, const double *uv,
-                               qp_error_report *report, qp_error *err) {
+static qp_status compare_stream(const qp_mesh *mesh, const qp_stream *stream, const double *uv,
+                                const qp_reference_sample *references, qp_error_report *report,
+                                qp_error *err) {
     unsigned n_workers = qp_thread_count();
-    double *rounded = stream->precision == QP_FLOAT ? rounded_positions(mesh) : NULL;
+    const bool round = stream->precision == QP_FLOAT && references == NULL;
+    double *rounded = round ? qp_reference_rounded_positions(mesh) : NULL;
     compare c = {.mesh = mesh,
                  .stream = stream,
                  .uv = uv,
+                 .references = references,
                  .positions = rounded ? rounded : mesh->positions,
                  .first = qp_alloc((size_t)mesh->n_patches + 1, sizeof(uint64_t), true),
                  .order = qp_alloc(stream->n_samples, sizeof(uint64_t), false),
@@ -226,7 +235,7 @@ qp_status qp_reference_compare(const qp_mesh *mesh, const qp_stream *stream, con
                  .workers = qp_alloc(n_workers, sizeof(worker_state), true)};
     memset(report, 0, sizeof *report);
     qp_status status;
-    if (!c.first || !c.order || !c.partials || !c.workers || (stream->precision == QP_FLOAT && !rounded))
+    if (!c.first || !c.order || !c.partials || !c.workers || (round && !rounded))
         status = qp_fail_memory(err, stream->n_samples * sizeof(uint64_t), "the comparison of samples");
     else
         status = run(&c, n_workers, report, err);
@@ -241,4 +250,15 @@ qp_status qp_reference_compare(const qp_mesh *mesh, const qp_stream *stream, con
     free(c.first);
     free(rounded);
     return status;
+}
+
+qp_status qp_reference_compare(const qp_mesh *mesh, const qp_stream *stream, const double *uv,
+                               qp_error_report *report, qp_error *err) {
+    return compare_stream(mesh, stream, uv, NULL, report, err);
+}
+
+qp_status qp_reference_compare_known(const qp_mesh *mesh, const qp_stream *stream, const double *uv,
+                                     const qp_reference_sample *references, qp_error_report *report,
+                                     qp_error *err) {
+    return compare_stream(mesh, stream, uv, references, report, err);
 }

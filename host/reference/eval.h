@@ -25,4 +25,14 @@ qp_status qp_reference_eval_with(qp_reference_work *work, const qp_mesh *mesh, c
                                  uint32_t patch, size_t count, const double *uv, qp_reference_sample *samples,
                                  qp_error *err);
 
+/* The mesh's positions as frames in float get them: rounded in the mesh's local frame. malloced, 3 a vertex; NULL when
+ * memory is out. */
+double *qp_reference_rounded_positions(const qp_mesh *mesh);
+
+/* qp_reference_compare where the reference's samples are known already, for many streams of one set of points:
+ * references has one for each sample of the stream. */
+qp_status qp_reference_compare_known(const qp_mesh *mesh, const qp_stream *stream, const double *uv,
+                                     const qp_reference_sample *references, qp_error_report *report,
+                                     qp_error *err);
+
 #endif

@@ -1,46 +1,25 @@
 /* Picture files: what to read and write; how is up to the module quadplan_images (codec.h). */
-#define _GNU_SOURCE
+#include "host/base/module.h"
 #include "host/base/output.h"
 #include "host/scene/codec.h"
 
-#include <dlfcn.h>
-#include <errno.h>
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
-#include <unistd.h>
-
-/* Where the module may lie, relative to the folder of the program: beside it (build folder), above it (tests in
- * the build folder), installed. */
-static const char *const places[] = {"", "../", QP_IMAGE_MODULE_FOLDER "/"};
 
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static const qp_image_codec *codec;
 
-static qp_status load_codec(qp_error *err) {
-    char folder[4096];
-    ssize_t length = readlink("/proc/self/exe", folder, sizeof folder - 1);
-    if (length < 0) return qp_fail(err, QP_SYSTEM, "cannot tell where the program lies: %s", strerror(errno));
-    folder[length] = '\0';
-    char *slash = strrchr(folder, '/');
-    if (slash != NULL) slash[1] = '\0';
-    for (size_t i = 0; i < sizeof places / sizeof *places && codec == NULL; ++i) {
-        char path[sizeof folder + 256];
-        snprintf(path, sizeof path, "%s%squadplan_images.so", folder, places[i]);
-        if (access(path, R_OK) != 0) continue;
-        void *module = dlopen(path, RTLD_NOW | RTLD_LOCAL);
-        if (module == NULL) return qp_fail(err, QP_SYSTEM, "pictures: %s", dlerror());
-        codec = dlsym(module, QP_IMAGE_MODULE_SYMBOL);
-    }
-    if (codec == NULL)
-        return qp_fail(err, QP_SYSTEM, "pictures: there is no quadplan_images.so near %s", folder);
-    return QP_OK;
-}
-
 static qp_status get_codec(const qp_image_codec **found, qp_error *err) {
     pthread_mutex_lock(&lock);
-    qp_status status = codec != NULL ? QP_OK : load_codec(err);
+    qp_status status = QP_OK;
+    if (codec == NULL) {
+        const void *symbol;
+        status = qp_module_load("pictures", "quadplan_images.so", QP_IMAGE_MODULE_FOLDER,
+                                QP_IMAGE_MODULE_SYMBOL, &symbol, err);
+        codec = symbol;
+    }
     *found = codec;
     pthread_mutex_unlock(&lock);
     return status;
