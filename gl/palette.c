@@ -1,5 +1,6 @@
 #include "gl/palette.h"
 #include "host/frame/classify.h"
+#include "host/frame/frame.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -45,8 +46,9 @@ static qp_leaf leaf_of(const qp_surface *surface, const qp_stream *stream, const
         u += stream->uv[2 * (size_t)triangle[k]] / 3;
         v += stream->uv[2 * (size_t)triangle[k] + 1] / 3;
     }
-    qp_rotate_uv(surface->patch_rotation[patch], &u, &v);
-    return qp_classify(surface->plans[surface->patch_plan[patch]], u, v);
+    double x = qp_signed_coordinate((double)u, QP_FLOAT), y = qp_signed_coordinate((double)v, QP_FLOAT);
+    qp_rotate_uv(surface->patch_rotation[patch], &x, &y);
+    return qp_classify(surface->plans[surface->patch_plan[patch]], x, y);
 }
 
 static uint32_t root_of(uint32_t *parent, uint32_t v) {

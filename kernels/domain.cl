@@ -72,9 +72,10 @@ QP_FUNCTION void QP_NAME(add_slots)(__global const real4 *support, __global cons
      QP_POINT(ring, slot + 3u), bu, du, bv, dv);
 }
 
-/* One of the three regular sub-domains of a terminal node's ring level: (u,v) with u >= 1/2 or v >= 1/2. */
-QP_FUNCTION void QP_NAME(eval_ring)(__global const real4 *support, __global const uint *ring, uint origin,
-                                    real u, real v, QP_NAME(surface_point) * s) {
+/* One of the three regular sub-domains of a terminal node's ring level: (u,v) with u >= 1/2 or v >= 1/2. Leaves the
+ * origin out. */
+QP_FUNCTION void QP_NAME(eval_ring)(__global const real4 *support, __global const uint *ring, real u, real v,
+                                    QP_NAME(surface_point) * s) {
     real bu[4], du[4], bv[4], dv[4];
     const uint cx = QP_NAME(is_upper)(u, 1u), cy = QP_NAME(is_upper)(v, 1u);
     const uint slot = 5u * cy + cx - 1u;
@@ -85,7 +86,6 @@ QP_FUNCTION void QP_NAME(eval_ring)(__global const real4 *support, __global cons
     QP_NAME(add_slots)(support, ring, slot + 5u, 0, bu, du, bv[1], dv[1], s);
     QP_NAME(add_slots)(support, ring, slot + 10u, 0, bu, du, bv[2], dv[2], s);
     QP_NAME(add_slots)(support, ring, slot + 15u, 0, bu, du, bv[3], dv[3], s);
-    QP_NAME(add_origin)(support, origin, s);
 }
 #endif
 
@@ -129,15 +129,16 @@ QP_FUNCTION void QP_NAME(eval_irregular)(__global const real4 *support, __global
 #endif
 
 #if QP_WITH_CORNERS && QP_WITH_TERMINAL
-/* What remains at an extraordinary corner (0,0): exact there; elsewhere, flagged, on the ray from the limit
- * point to where it leaves the corner cell, which the terminal's last ring covers. */
+/* What remains at an extraordinary corner (0,0): exact there; elsewhere the doubling goes on in the terminal's last ring, by whose
+ * ratio everything shrinks a level (plan_layout.h). `shrink` scales that ring's points; `rings` is their number. */
 QP_FUNCTION void QP_NAME(eval_extraordinary)(__global const real4 *support, __global const uint *node,
-                                             __global const uint *ring, uint origin, real signed_u,
-                                             real signed_v, QP_NAME(surface_point) * s) {
-    const real u = QP_NAME(plain)(signed_u), v = QP_NAME(plain)(signed_v), t = u > v ? u : v;
+                                             __global const real *constants, __global const uint *ring,
+                                             uint rings, uint origin, real shrink, real u, real v,
+                                             QP_NAME(surface_point) * s) {
     /* Points 0..2 are 16-bit values in a word each. */
-    if (t == QP_R(0.0) || ring == 0) {
-        s->p = support[node[1]];
+    const real4 limit = support[node[1]];
+    if ((u == QP_R(0.0) && v == QP_R(0.0)) || ring == 0) {
+        s->p = limit;
         if (node[2] == QP_NO_POINT || node[3] == QP_NO_POINT) {
             s->du = s->dv = make4(QP_R(0.0), QP_R(0.0), QP_R(0.0));
         } else {
@@ -146,14 +147,25 @@ QP_FUNCTION void QP_NAME(eval_extraordinary)(__global const real4 *support, __gl
         }
         s->level = 0;
         s->flags |= QP_FLAG_LIMIT_FRAME;
-        if (t != QP_R(0.0)) s->flags |= QP_FLAG_PAST_DEPTH;
+        if (u != QP_R(0.0) || v != QP_R(0.0)) s->flags |= QP_FLAG_PAST_DEPTH;
         return;
     }
-    /* The larger of the two is exactly 1/2. */
-    QP_NAME(eval_ring)(support, ring, origin, QP_R(0.5) * qp_div(u, t), QP_R(0.5) * qp_div(v, t), s);
-    const real4 limit = support[node[1]];
-    s->p = fma4(sub4(s->p, limit), t, limit);
-    s->flags |= QP_FLAG_PAST_DEPTH;
+    /* Ends, for coordinates are 0 or normal numbers. */
+    const real ratio = constants[node[4]];
+    shrink *= ratio;
+    s->stretch = QP_R(2.0) * ratio;
+    while (QP_NAME(is_upper)(u, 1u) == 0 && QP_NAME(is_upper)(v, 1u) == 0) {
+        u = QP_NAME(in_half)(u, 0u);
+        v = QP_NAME(in_half)(v, 0u);
+        shrink *= ratio;
+        s->stretch *= QP_R(2.0) * ratio;
+    }
+    /* Back to the level of the last ring, and what its points are scaled by. */
+    s->level -= origin == QP_NO_POINT ? 1 : (int)rings;
+    QP_NAME(eval_ring)(support, ring, u, v, s);
+    if (origin == QP_NO_POINT) s->p = sub4(s->p, limit);
+    s->p = fma4(s->p, shrink, limit);
+    if ((node[0] & QP_NODE_EXACT) == 0) s->flags |= QP_FLAG_PAST_DEPTH;
 }
 #endif
 
@@ -164,10 +176,12 @@ QP_FUNCTION void QP_NAME(eval_tree)(__global const uint *tree, __global const re
     __global const uint *node = tree;
 #if QP_WITH_TERMINAL && QP_WITH_CORNERS
     __global const uint *last_ring = 0;
-    uint last_origin = QP_NO_POINT;
+    uint last_origin = QP_NO_POINT, last_rings = 0;
+    real last_shrink = QP_R(1.0);
 #endif
     s->flags = 0;
     s->level = 0;
+    s->stretch = QP_R(1.0);
     for (;;) {
         const uint word = node[0], kind = QP_NODE_KIND(word);
 #if QP_WITH_INTERNAL
@@ -187,9 +201,14 @@ QP_FUNCTION void QP_NAME(eval_tree)(__global const uint *tree, __global const re
             __global const uint *ring = node + 3;
             QP_NAME(rotate_uv)(QP_NODE_ROTATION(word), &u, &v);
             s->turn += QP_NODE_ROTATION(word);
-            for (uint k = 0; k < rings; ++k, ring += 12) {
+            /* The points of ring k are offsets times 2^k, so that what the cells shrink by their slopes grow by. */
+            real shrink = QP_R(1.0);
+            for (uint k = 0; k < rings; ++k, ring += 12, shrink *= QP_R(0.5)) {
                 if (QP_NAME(is_upper)(u, 1u) != 0 || QP_NAME(is_upper)(v, 1u) != 0) {
-                    QP_NAME(eval_ring)(support, ring, k < absolute ? QP_NO_POINT : origin, u, v, s);
+                    QP_NAME(eval_ring)(support, ring, u, v, s);
+                    if (k < absolute || origin == QP_NO_POINT) return;
+                    s->level -= (int)k;
+                    s->p = fma4(s->p, shrink, support[origin]);
                     return;
                 }
                 u = QP_NAME(in_half)(u, 0u);
@@ -198,7 +217,9 @@ QP_FUNCTION void QP_NAME(eval_tree)(__global const uint *tree, __global const re
             }
 #if QP_WITH_CORNERS
             last_ring = rings == 0 ? 0 : ring - 12;
+            last_rings = rings;
             last_origin = rings <= absolute ? QP_NO_POINT : origin;
+            last_shrink = last_origin == QP_NO_POINT ? QP_R(1.0) : QP_R(2.0) * shrink;
 #endif
             /* The tail is in the frame that this node was entered in; an extraordinary corner turns itself. */
             QP_NAME(rotate_uv)((4u - QP_NODE_ROTATION(word)) & 3u, &u, &v);
@@ -220,7 +241,8 @@ QP_FUNCTION void QP_NAME(eval_tree)(__global const uint *tree, __global const re
         if (kind == QP_NODE_EXTRAORDINARY) {
             QP_NAME(rotate_uv)(QP_NODE_ROTATION(word), &u, &v);
             s->turn += QP_NODE_ROTATION(word);
-            QP_NAME(eval_extraordinary)(support, node, last_ring, last_origin, u, v, s);
+            QP_NAME(eval_extraordinary)
+            (support, node, constants, last_ring, last_rings, last_origin, last_shrink, u, v, s);
             return;
         }
 #endif
@@ -284,7 +306,7 @@ __kernel void QP_NAME(domain)(__global const uint *heads, __global const uint *t
             if (want_derivatives != 0)
                 QP_NAME(write_derivatives)
             (derivatives + 6u * (out + i + l), s.du, s.dv, s.turn,
-             ldexp(positions[QP_POSITION_SCALE], s.level));
+             s.stretch * ldexp(positions[QP_POSITION_SCALE], s.level));
         }
         lanes p[3], du[3], dv[3];
         for (uint c = 0; c < 3u; ++c) {

@@ -15,6 +15,20 @@ QP_FUNCTION void QP_NAME(basis)(real t, real b[4], real d[4]) {
     d[3] = t2 * QP_R(0.5);
 }
 
+/* The derivatives of order `order` (0 or 1) of the basis, and the next. */
+QP_FUNCTION void QP_NAME(basis_of_order)(uint order, real t, real b[4], real d[4]) {
+    if (order == 0) {
+        QP_NAME(basis)(t, b, d);
+        return;
+    }
+    real unused[4];
+    QP_NAME(basis)(t, unused, b);
+    d[0] = QP_R(1.0) - t;
+    d[1] = fma(QP_R(3.0), t, QP_R(-2.0));
+    d[2] = fma(QP_R(-3.0), t, QP_R(1.0));
+    d[3] = t;
+}
+
 /* basis() for lanes: the same operations in the same order. */
 QP_FUNCTION void QP_NAME(basis_lanes)(lanes t, lanes b[4], lanes d[4]) {
     lanes s = sub_lanes(splat(QP_R(1.0)), t);
@@ -35,8 +49,10 @@ QP_FUNCTION void QP_NAME(basis_lanes)(lanes t, lanes b[4], lanes d[4]) {
  * scale, which is all that a normal needs. */
 typedef struct QP_NAME(surface_point) {
     real4 p, du, dv;
+    real size; /* of the numbers that p, du and dv were made from, which tells their rounding; < 0: the patch's */
     uint flags;
-    int level; /* the leaf is 2^-level of the patch */
+    int level; /* the leaf is 2^-level of the patch, or would be, were its points not stored times a power of two */
+    real stretch; /* factor left out of du and dv, which are to be multiplied by it */
     uint turn; /* rotation of the leaf's (u,v) against the patch's, mod 4 */
 } QP_NAME(surface_point);
 
@@ -69,36 +85,86 @@ QP_FUNCTION real4 QP_NAME(cross_product)(real4 a, real4 b) {
                  QP_NAME(difference_of_products)(a.x, b.y, a.y, b.x));
 }
 
+/* Largest component, and squared length. */
+QP_FUNCTION real QP_NAME(largest)(real4 a) {
+    const real x = fabs(a.x), y = fabs(a.y), z = fabs(a.z), most = x > y ? x : y;
+    return most > z ? most : z;
+}
+QP_FUNCTION real QP_NAME(square_length)(real4 a) {
+    return fma(a.z, a.z, fma(a.y, a.y, a.x * a.x));
+}
+
 /* Divides a vector by the power of two of its largest component (exact), so that products of its components
- * neither overflow nor vanish. False when it is zero or not finite. */
-QP_FUNCTION int QP_NAME(rescale)(real4 *a) {
-    real x = fabs(a->x), y = fabs(a->y), z = fabs(a->z);
-    real most = x > y ? x : y;
-    most = most > z ? most : z;
+ * neither overflow nor vanish; *power is the exponent of what it was multiplied by. False when it is zero or not finite. */
+QP_FUNCTION int QP_NAME(rescale)(real4 *a, int *power) {
+    const real most = QP_NAME(largest)(*a);
     /* The sum catches a NaN that the comparisons passed over. */
-    if (!(most > QP_R(0.0)) || !(x + y + z < (real)INFINITY)) return 0;
-    int power = -ilogb(most);
-    *a = make4(ldexp(a->x, power), ldexp(a->y, power), ldexp(a->z, power));
+    if (!(most > QP_R(0.0)) || !(fabs(a->x) + fabs(a->y) + fabs(a->z) < (real)INFINITY)) return 0;
+    *power = -ilogb(most);
+    *a = make4(ldexp(a->x, *power), ldexp(a->y, *power), ldexp(a->z, *power));
     return 1;
 }
 
-/* Unit vector along du x dv. Zero and QP_FLAG_NO_NORMAL where they are parallel, zero or not finite. */
-QP_FUNCTION real4 QP_NAME(unit_normal)(real4 du, real4 dv, uint *flags) {
+QP_FUNCTION real4 QP_NAME(unit)(real4 n) {
+    return scale4(n, qp_div(QP_R(1.0), qp_sqrt(QP_NAME(square_length)(n))));
+}
+
+/* Unit vector along du x dv. Zero and QP_FLAG_NO_NORMAL where it is lost in rounding: du and dv are off by some QP_EPSILON * size,
+ * so that du x dv is off by about QP_EPSILON * size * (|du| + |dv|), and one no longer than sixteen times that may point anywhere.
+ */
+QP_FUNCTION real4 QP_NAME(unit_normal)(real4 du, real4 dv, real size, uint *flags) {
+    const real noise = QP_NOISE * size;
     real4 n = QP_NAME(cross_product)(du, dv);
-    real length2 = fma(n.z, n.z, fma(n.y, n.y, n.x * n.x));
-    if (!(length2 > QP_TINY && length2 < QP_HUGE)) {
-        int good = QP_NAME(rescale)(&du) && QP_NAME(rescale)(&dv);
-        if (good) {
+    const real length2 = QP_NAME(square_length)(n);
+    const real slopes2 = QP_NAME(square_length)(du) + QP_NAME(square_length)(dv);
+    if (length2 > QP_TINY && length2 < QP_HUGE) {
+        if (length2 > noise * noise * slopes2) return QP_NAME(unit)(n);
+    } else {
+        int u_power, v_power, power;
+        if (QP_NAME(rescale)(&du, &u_power) && QP_NAME(rescale)(&dv, &v_power)) {
             n = QP_NAME(cross_product)(du, dv);
-            good = QP_NAME(rescale)(&n);
+            if (QP_NAME(largest)(n) > ldexp(noise, u_power) + ldexp(noise, v_power) &&
+                QP_NAME(rescale)(&n, &power))
+                return QP_NAME(unit)(n);
         }
-        if (!good) {
-            *flags |= QP_FLAG_NO_NORMAL;
-            return make4(QP_R(0.0), QP_R(0.0), QP_R(0.0));
-        }
-        length2 = fma(n.z, n.z, fma(n.y, n.y, n.x * n.x));
     }
-    return scale4(n, qp_div(QP_R(1.0), qp_sqrt(length2)));
+    *flags |= QP_FLAG_NO_NORMAL;
+    return make4(QP_R(0.0), QP_R(0.0), QP_R(0.0));
+}
+
+/* A vector in a leaf's frame turned into the patch's, as derivatives are below. */
+QP_FUNCTION void QP_NAME(turn_pair)(uint turn, real4 da, real4 db, real4 *u, real4 *v) {
+    *u = scale4((turn & 1u) != 0 ? db : da, ((turn + 1u) & 2u) != 0 ? QP_R(-1.0) : QP_R(1.0));
+    *v = scale4((turn & 1u) != 0 ? da : db, (turn & 2u) != 0 ? QP_R(-1.0) : QP_R(1.0));
+}
+
+/* Where N = du x dv vanishes, the normal is the limit of N / |N| from within the patch, if that is the same from all sides: to
+ * first order N changes by t DN d in direction d, so the limit is DN d / |DN d| for every d that points into the patch. Inside an
+ * edge of the patch both d and -d along it do, so DN must vanish along it (as it does where an edge is pulled together into a
+ * point); at its corners both must give the same; within it DN must vanish, and no normal is found.
+ * u, v: the place in the patch. with_u: (du, duu, duv) in p, du, dv; with_v: (dv, duv, dvv); both in the leaf's frame.
+ * False where there is none. */
+QP_FUNCTION int QP_NAME(normal_from_within)(real u, real v, QP_NAME(surface_point) with_u,
+                                            QP_NAME(surface_point) with_v, real size, real4 *normal) {
+    const real4 na = add4(QP_NAME(cross_product)(with_u.du, with_v.p), QP_NAME(cross_product)(with_u.p, with_v.du));
+    const real4 nb = add4(QP_NAME(cross_product)(with_u.dv, with_v.p), QP_NAME(cross_product)(with_u.p, with_v.dv));
+    const real slopes = QP_NAME(largest)(with_u.p) + QP_NAME(largest)(with_v.p) + QP_NAME(largest)(with_u.du) +
+                        QP_NAME(largest)(with_u.dv) + QP_NAME(largest)(with_v.dv);
+    const real least = QP_R(4.0) * QP_NOISE * size * slopes;
+    real4 along[2], found = make4(QP_R(0.0), QP_R(0.0), QP_R(0.0));
+    int count = 0, power;
+    QP_NAME(turn_pair)(with_u.turn, na, nb, &along[0], &along[1]);
+    for (uint k = 0; k < 2u; ++k) {
+        const real x = k == 0 ? u : v;
+        if (!(QP_NAME(largest)(along[k]) > least)) continue;
+        if (x != QP_R(0.0) || !QP_NAME(rescale)(&along[k], &power)) return 0;
+        const real4 n = scale4(QP_NAME(unit)(along[k]), signbit(x) != 0 ? QP_R(-1.0) : QP_R(1.0));
+        /* Within a thousandth of a right angle's measure of each other, or there is a cone. */
+        if (count++ != 0 && !(QP_NAME(square_length)(sub4(n, found)) < QP_R(1e-6))) return 0;
+        found = n;
+    }
+    *normal = found;
+    return count != 0;
 }
 
 /* Coordinates, as frame_layout.h holds them. 1 - x: */
@@ -161,7 +227,8 @@ QP_FUNCTION void QP_NAME(write_lane_derivatives)(__global real *derivatives, ulo
  * unit_normal() itself. */
 QP_FUNCTION void QP_NAME(write_samples)(__global real *vertices, __global uchar *flags, ulong i, uint block,
                                         __global const real *positions, real4 origin, const lanes p[3],
-                                        const lanes du[3], const lanes dv[3], uint flag[QP_LANES]) {
+                                        const lanes du[3], const lanes dv[3], lanes size,
+                                        uint flag[QP_LANES]) {
     lanes n[3];
     real result[6][QP_LANES];
     for (uint c = 0; c < 3u; ++c) {
@@ -177,15 +244,22 @@ QP_FUNCTION void QP_NAME(write_samples)(__global real *vertices, __global uchar 
     store_lanes(fma_lanes(add_lanes(splat(origin.y), p[1]), scale, splat(positions[1])), result[1]);
     store_lanes(fma_lanes(add_lanes(splat(origin.z), p[2]), scale, splat(positions[2])), result[2]);
     for (uint c = 0; c < 3u; ++c) store_lanes(mul_lanes(n[c], inverse), result[3u + c]);
-    if (!lanes_within(length2, QP_TINY, QP_HUGE)) {
-        real slopes[6][QP_LANES];
+    const lanes noise = mul_lanes(splat(QP_NOISE), size);
+    const lanes slopes2 =
+        add_lanes(fma_lanes(du[2], du[2], fma_lanes(du[1], du[1], mul_lanes(du[0], du[0]))),
+                  fma_lanes(dv[2], dv[2], fma_lanes(dv[1], dv[1], mul_lanes(dv[0], dv[0]))));
+    if (!lanes_within(length2, QP_TINY, QP_HUGE) ||
+        !lanes_above(length2, mul_lanes(mul_lanes(noise, noise), slopes2))) {
+        real slopes[6][QP_LANES], sizes[QP_LANES];
+        store_lanes(size, sizes);
         for (uint c = 0; c < 3u; ++c) {
             store_lanes(du[c], slopes[c]);
             store_lanes(dv[c], slopes[3u + c]);
         }
         for (uint l = 0; l < QP_LANES; ++l) {
             const real4 m = QP_NAME(unit_normal)(make4(slopes[0][l], slopes[1][l], slopes[2][l]),
-                                                 make4(slopes[3][l], slopes[4][l], slopes[5][l]), &flag[l]);
+                                                 make4(slopes[3][l], slopes[4][l], slopes[5][l]), sizes[l],
+                                                 &flag[l]);
             result[3][l] = m.x;
             result[4][l] = m.y;
             result[5][l] = m.z;

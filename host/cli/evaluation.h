@@ -27,7 +27,7 @@ typedef struct cli_evaluation_options {
 #define CLI_SAMPLING_OPTIONS(o)                                                                              \
     {"--precision", CLI_PRECISIONS, "of stencils and kernels (default float)",                               \
      CLI_CHOICE, &(o).precision, 0, 0, NULL},                                                                \
-    {"--depth", "N", "deepest subdivision level of the plans, 1 to 24 (default 10)",                         \
+    {"--depth", "N", "deepest subdivision level of the plans, 1 to 60 (default 10)",                         \
      CLI_COUNT, &(o).depth, 1, QP_DEPTH_LIMIT, NULL},                                                                    \
     {"--device", "D", "host, P.D, or part of a name, as `quadplan devices` lists them",                      \
      CLI_TEXT, &(o).device, 0, 0, NULL},                                                                     \

@@ -55,7 +55,7 @@ static qp_status run(int argc, char **argv, qp_error *err) {
     uint64_t depth = 6;
     bool json = false, no_crease_nodes = false, no_terminal_nodes = false;
     const cli_option options[] = {
-        {"--depth", "N", "deepest subdivision level of the plans, 1 to 24 (default 6, the paper's)",
+        {"--depth", "N", "deepest subdivision level of the plans, 1 to 60 (default 6, the paper's)",
          CLI_COUNT, &depth, 1, QP_DEPTH_LIMIT, NULL},
         {"--no-crease-nodes", NULL, "subdivide along single creases instead, for comparison", CLI_FLAG,
          &no_crease_nodes, 0, 0, NULL},

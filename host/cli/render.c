@@ -115,7 +115,7 @@ static qp_status run(int argc, char **argv, qp_error *err) {
         {"--size", "WxH", "of the picture, in pixels", CLI_SIZES, &o.size, 0, 0, &o.size_given},
         {"--precision", CLI_PRECISIONS, "of stencils and kernels (default float)", CLI_CHOICE, &o.precision,
          0, 0, NULL},
-        {"--depth", "N", "deepest subdivision level of the plans, 1 to 24", CLI_COUNT, &o.depth, 1,
+        {"--depth", "N", "deepest subdivision level of the plans, 1 to 60", CLI_COUNT, &o.depth, 1,
          QP_DEPTH_LIMIT, NULL},
         {"--device", "D", "host, P.D, or part of a name, as `quadplan devices` lists them", CLI_TEXT,
          &o.device, 0, 0, NULL},

@@ -13,18 +13,18 @@ static void put_wide(uint32_t *word, uint64_t value) {
 }
 
 static uint32_t item_rows(const qp_frame *frame, const qp_frame_item *item) {
-    return frame->surface->plans[frame->surface->patch_plan[item->patch]]->rows[item->level];
+    return qp_frame_plan_of(frame, item->patch).plan->rows[item->level];
 }
 
 static void write_entry(const qp_frame *frame, const qp_frame_item *item, const qp_frame_batch *batch,
                         uint64_t support, uint32_t *entry) {
-    const qp_surface *surface = frame->surface;
+    const qp_frame_plan plan = qp_frame_plan_of(frame, item->patch);
     for (uint32_t i = 0; i < QP_ENTRY_WORDS; ++i) entry[i] = 0;
-    entry[QP_ENTRY_HEAD] = surface->patch_plan[item->patch] * QP_HEAD_WORDS;
-    entry[QP_ENTRY_ROTATION] = surface->patch_rotation[item->patch];
+    entry[QP_ENTRY_HEAD] = plan.index * QP_HEAD_WORDS;
+    entry[QP_ENTRY_ROTATION] = plan.rotation;
     entry[QP_ENTRY_ROWS] = item_rows(frame, item);
     entry[QP_ENTRY_SAMPLES] = item->samples;
-    put_wide(entry + QP_ENTRY_RING, surface->patch_ring[item->patch]);
+    put_wide(entry + QP_ENTRY_RING, plan.ring);
     put_wide(entry + QP_ENTRY_SUPPORT, support);
     put_wide(entry + QP_ENTRY_GRID, item->grid);
     put_wide(entry + QP_ENTRY_OUT, item->out - batch->first_sample);
@@ -70,22 +70,21 @@ static qp_status cut_batch(qp_frame *frame, size_t begin, size_t *end, uint32_t 
  * same weights follow each other. count: scratch, [n_plans + 1]. */
 static void write_batch(const qp_frame *frame, const qp_frame_batch *batch, size_t begin, size_t end,
                         uint32_t *count, uint32_t *entries) {
-    const qp_surface *surface = frame->surface;
     const qp_frame_layout *layout = &frame->layout;
     uint32_t regular = batch->first_regular;
-    for (uint32_t p = 0; p <= surface->n_plans; ++p) count[p] = 0;
+    for (uint32_t p = 0; p <= frame->n_plans; ++p) count[p] = 0;
     for (size_t i = begin; i < end; ++i) {
         uint32_t patch = layout->items[i].patch;
-        if (!qp_frame_is_fast(frame, patch)) ++count[surface->patch_plan[patch] + 1];
+        if (!qp_frame_is_fast(frame, patch)) ++count[qp_frame_plan_of(frame, patch).index + 1];
     }
-    for (uint32_t p = 0; p < surface->n_plans; ++p) count[p + 1] += count[p];
+    for (uint32_t p = 0; p < frame->n_plans; ++p) count[p + 1] += count[p];
     uint64_t support = 0;
     for (size_t i = begin; i < end; ++i) {
         const qp_frame_item *item = &layout->items[i];
         if (qp_frame_is_fast(frame, item->patch)) {
             write_entry(frame, item, batch, 0, entries + QP_ENTRY_WORDS * (size_t)regular++);
         } else {
-            uint32_t at = batch->first_general + count[surface->patch_plan[item->patch]]++;
+            uint32_t at = batch->first_general + count[qp_frame_plan_of(frame, item->patch).index]++;
             write_entry(frame, item, batch, support, entries + QP_ENTRY_WORDS * (size_t)at);
             support += item_rows(frame, item);
         }
@@ -94,7 +93,7 @@ static void write_batch(const qp_frame *frame, const qp_frame_batch *batch, size
 
 static qp_status write_entries(const qp_frame *frame, uint32_t **entries, const size_t *ends, qp_error *err) {
     const size_t bytes = frame->layout.n_items * QP_ENTRY_WORDS * sizeof(uint32_t);
-    uint32_t *count = qp_alloc((size_t)frame->surface->n_plans + 1, sizeof *count, false);
+    uint32_t *count = qp_alloc((size_t)frame->n_plans + 1, sizeof *count, false);
     *entries = qp_alloc(frame->layout.n_items, QP_ENTRY_WORDS * sizeof(uint32_t), false);
     if (count == NULL || *entries == NULL) {
         free(count);
@@ -123,7 +122,7 @@ static qp_status reserve_pages(void **block, size_t *have, size_t bytes, const c
 
 /* The stream's memory, and a buffer over each batch's part of it. */
 static qp_status wrap_stream(qp_frame *frame, qp_error *err) {
-    const size_t samples = (size_t)frame->layout.n_samples, sample_bytes = 6 * frame->real_size;
+    const size_t samples = (size_t)frame->layout.n_evaluated, sample_bytes = 6 * frame->real_size;
     qp_status status = reserve_pages(&frame->vertices, &frame->vertex_bytes, samples * sample_bytes,
                                      "the vertex stream", err);
     if (status == QP_OK)
@@ -152,12 +151,6 @@ static qp_status wrap_stream(qp_frame *frame, qp_error *err) {
     return status;
 }
 
-static qp_status upload(qp_frame *frame, qp_buffer *buffer, const void *from, size_t bytes, const char *what,
-                        qp_error *err) {
-    qp_status status = qp_buffer_reserve(frame->device, buffer, bytes, what, err);
-    return status == QP_OK ? qp_buffer_write(frame->device, buffer, from, bytes, err) : status;
-}
-
 /* Coordinates in the device's form, with the padding that whole blocks of lanes read. */
 static qp_status upload_grid(qp_frame *frame, qp_buffer *buffer, const double *from, size_t points,
                              qp_error *err) {
@@ -171,7 +164,7 @@ static qp_status upload_grid(qp_frame *frame, qp_buffer *buffer, const double *f
         else
             ((float *)signs)[i] = (float)s;
     }
-    qp_status status = upload(frame, buffer, signs, count * frame->real_size, "tessellation grids", err);
+    qp_status status = qp_frame_upload(frame, buffer, signs, count * frame->real_size, "tessellation grids", err);
     free(signs);
     return status;
 }
@@ -193,7 +186,7 @@ qp_status qp_frame_upload_layout(qp_frame *frame, qp_error *err) {
     }
     if (status == QP_OK) status = write_entries(frame, &entries, ends, err);
     if (status == QP_OK)
-        status = upload(frame, &frame->entries, entries, layout->n_items * QP_ENTRY_WORDS * sizeof(uint32_t),
+        status = qp_frame_upload(frame, &frame->entries, entries, layout->n_items * QP_ENTRY_WORDS * sizeof(uint32_t),
                         "the patches of a frame", err);
     if (status == QP_OK)
         status = upload_grid(frame, &frame->grid_u, layout->grid_u, layout->grid_points, err);

@@ -1,16 +1,23 @@
 #include "host/frame/classify.h"
 
-void qp_rotate_uv(uint32_t rotation, float *u, float *v) {
-    float a = *u, b = *v;
+#include <math.h>
+
+/* 1 - x */
+static double mirrored(double x) {
+    return x == 0.5 ? x : -x;
+}
+
+void qp_rotate_uv(uint32_t rotation, double *u, double *v) {
+    double a = *u, b = *v;
     switch (rotation & 3u) {
     case 1:
-        *u = b, *v = 1 - a;
+        *u = b, *v = mirrored(a);
         break;
     case 2:
-        *u = 1 - a, *v = 1 - b;
+        *u = mirrored(a), *v = mirrored(b);
         break;
     case 3:
-        *u = 1 - b, *v = a;
+        *u = mirrored(b), *v = a;
         break;
     default:
         break;
@@ -19,13 +26,18 @@ void qp_rotate_uv(uint32_t rotation, float *u, float *v) {
 
 /* The half in which x of a node lies; at the middle the upper one, or the lower one on a tie. x becomes its
  * place there. */
-static uint32_t enter_half(float *x, uint32_t tie) {
-    uint32_t upper = *x > 0.5f || (*x == 0.5f && !tie);
-    *x = 2 * *x - (float)upper;
+static uint32_t enter_half(double *x, uint32_t tie) {
+    uint32_t upper = signbit(*x) || (*x == 0.5 && !tie);
+    double t = 2.0 * fabs(*x), lower = t <= 0.5 ? t : -(1.0 - t);
+    *x = upper ? mirrored(lower) : lower;
     return upper;
 }
 
-qp_leaf qp_classify(const qp_plan *plan, float u, float v) {
+static bool is_upper(double x) {
+    return signbit(x) || x == 0.5;
+}
+
+qp_leaf qp_classify(const qp_plan *plan, double u, double v) {
     uint32_t node = 0, level = 0;
     for (;;) {
         const uint32_t *words = plan->tree + node;
@@ -39,13 +51,15 @@ qp_leaf qp_classify(const qp_plan *plan, float u, float v) {
             qp_rotate_uv(QP_NODE_ROTATION(words[0]), &u, &v);
             for (uint32_t ring = 0; ring < QP_NODE_RINGS(words[0]); ring++) {
                 level++;
-                if (u >= 0.5f || v >= 0.5f) return (qp_leaf){QP_NODE_TERMINAL, level};
-                u *= 2, v *= 2;
+                if (is_upper(u) || is_upper(v))
+                    return (qp_leaf){.kind = QP_NODE_TERMINAL, .level = level, .corner = u == 0 && v == 0};
+                enter_half(&u, 0);
+                enter_half(&v, 0);
             }
             qp_rotate_uv(4 - QP_NODE_ROTATION(words[0]), &u, &v); /* back into the frame it was entered in */
             node = words[2];
         } else {
-            return (qp_leaf){kind, level};
+            return (qp_leaf){.kind = kind, .level = level, .corner = u == 0 && v == 0};
         }
     }
 }

@@ -6,58 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static qp_status upload(qp_frame *frame, qp_buffer *buffer, const void *from, size_t bytes, const char *what,
-                        qp_error *err) {
-    qp_status status = qp_buffer_reserve(frame->device, buffer, bytes, what, err);
-    return status == QP_OK ? qp_buffer_write(frame->device, buffer, from, bytes, err) : status;
-}
-
-/* Which kernels, and which code in them, the patches need. */
-static void collect_needs(const qp_frame *frame, unsigned *kernels, uint32_t *plan_flags) {
-    const qp_surface *surface = frame->surface;
-    *kernels = 0;
-    *plan_flags = 0;
-    for (uint32_t p = 0; p < surface->mesh->n_patches; ++p) {
-        if (surface->patch_plan[p] == QP_NONE) continue;
-        if (qp_frame_is_fast(frame, p)) {
-            *kernels |= 1u << QP_KERNEL_REGULAR;
-        } else {
-            *kernels |= 1u << QP_KERNEL_HULL | 1u << QP_KERNEL_DOMAIN;
-            *plan_flags |= surface->plans[surface->patch_plan[p]]->flags;
-        }
-    }
-}
-
-static qp_status upload_plans(qp_frame *frame, qp_error *err) {
-    const qp_surface *surface = frame->surface;
-    qp_plan_pack pack = {0};
-    qp_status status = qp_surface_pack(surface, frame->options.precision, &pack, err);
-    if (status != QP_OK) return status;
-    status = upload(frame, &frame->heads, pack.heads, pack.head_words * sizeof *pack.heads, "plans", err);
-    if (status == QP_OK)
-        status =
-            upload(frame, &frame->trees, pack.tree, pack.tree_words * sizeof *pack.tree, "quadtrees", err);
-    if (status == QP_OK) {
-        /* The hull reads whole blocks of lanes: pad. */
-        const size_t bytes = pack.real_count * frame->real_size, padding = QP_PADDING * frame->real_size;
-        char *padded = qp_alloc(bytes + padding, 1, true);
-        if (padded == NULL) {
-            status = qp_fail_memory(err, bytes + padding, "stencils");
-        } else {
-            if (bytes != 0) memcpy(padded, pack.reals, bytes);
-            status = upload(frame, &frame->reals, padded, bytes + padding, "stencils", err);
-            free(padded);
-        }
-    }
-    if (status == QP_OK)
-        status = upload(frame, &frame->rings, surface->rings,
-                        (size_t)surface->ring_entries * sizeof(uint32_t), "1-rings", err);
-    free(pack.heads);
-    free(pack.tree);
-    free(pack.reals);
-    return status;
-}
-
 static void put_real(const qp_frame *frame, void *reals, size_t i, double x) {
     if (frame->options.precision == QP_FLOAT)
         ((float *)reals)[i] = (float)x;
@@ -81,7 +29,7 @@ qp_status qp_frame_update_positions(qp_frame *frame, qp_error *err) {
     for (size_t i = 0; i < count; ++i)
         put_real(frame, local, QP_POSITION_FIRST + i,
                  ldexp(mesh->positions[i] - f.centre[i % 3], -f.exponent));
-    qp_status status = upload(frame, &frame->positions, local, reals * frame->real_size, "positions", err);
+    qp_status status = qp_frame_upload(frame, &frame->positions, local, reals * frame->real_size, "positions", err);
     free(local);
     return status;
 }
@@ -95,12 +43,9 @@ qp_status qp_frame_create(qp_device *device, const qp_surface *surface, const qp
     f->surface = surface;
     if (options != NULL) f->options = *options;
     f->real_size = f->options.precision == QP_DOUBLE ? sizeof(double) : sizeof(float);
-    unsigned kernels;
-    uint32_t plan_flags;
-    collect_needs(f, &kernels, &plan_flags);
-    qp_status status = qp_program_build(device, f->options.precision, kernels, plan_flags, &f->program, err);
-    if (status == QP_OK) status = upload_plans(f, err);
+    qp_status status = qp_frame_upload_plans(f, err);
     if (status == QP_OK) status = qp_frame_update_positions(f, err);
+    if (status == QP_OK && !f->options.no_sharing) status = qp_share_create(surface, &f->share, err);
     if (status != QP_OK) {
         qp_frame_free(f);
         return status;
@@ -117,7 +62,10 @@ void qp_frame_free(qp_frame *frame) {
                                   &frame->grid_u, &frame->grid_v,    &frame->support};
     for (size_t i = 0; i < sizeof buffers / sizeof buffers[0]; ++i) qp_buffer_free(frame->device, buffers[i]);
     qp_program_free(&frame->program);
+    qp_frame_drop_deep(frame);
     free(frame->patch_factors);
+    free(frame->edge_factors);
+    qp_share_free(frame->share);
     free(frame->vertices);
     free(frame->flags);
     free(frame->derivatives);
@@ -239,6 +187,7 @@ static qp_status evaluate(qp_frame *frame, qp_stream *stream, qp_error *err) {
         if (status == QP_OK && frame->options.want_derivatives)
             status = qp_buffer_map(frame->device, &frame->batches[b].derivatives, err);
     }
+    if (status == QP_OK) qp_copies_apply(&layout->copies, frame->real_size, frame->vertices, frame->flags);
     if (status == QP_OK && layout->order != NULL) {
         order_job job = {frame, sample_bytes};
         qp_parallel((size_t)layout->n_samples, 4096, order_samples, &job);
@@ -261,26 +210,40 @@ static qp_status evaluate(qp_frame *frame, qp_stream *stream, qp_error *err) {
 static bool same_tessellation(const qp_frame *frame, const qp_tessellation *t) {
     if (!frame->tessellated || t->spacing != frame->tessellation.spacing) return false;
     if ((t->patch_factors == NULL) != (frame->patch_factors == NULL)) return false;
-    if (t->patch_factors == NULL) return t->factor == frame->tessellation.factor;
-    return memcmp(t->patch_factors, frame->patch_factors,
-                  6 * sizeof(float) * frame->surface->mesh->n_patches) == 0;
+    if (t->patch_factors != NULL)
+        return memcmp(t->patch_factors, frame->patch_factors,
+                      6 * sizeof(float) * frame->surface->mesh->n_patches) == 0;
+    if ((t->edge_factors == NULL) != (frame->edge_factors == NULL)) return false;
+    if (t->edge_factors != NULL)
+        return memcmp(t->edge_factors, frame->edge_factors, sizeof(float) * frame->surface->mesh->n_edges) ==
+               0;
+    return t->factor == frame->tessellation.factor;
+}
+
+/* A copy of n factors in *copy, in place of what it was; NULL of NULL. */
+static qp_status keep_factors(float **copy, const float *factors, size_t n, qp_error *err) {
+    free(*copy);
+    *copy = NULL;
+    if (factors == NULL) return QP_OK;
+    *copy = qp_alloc(n, sizeof(float), false);
+    if (*copy == NULL) return qp_fail_memory(err, n * sizeof(float), "tessellation factors");
+    memcpy(*copy, factors, n * sizeof(float));
+    return QP_OK;
 }
 
 static qp_status set_up(qp_frame *frame, const qp_tessellation *tessellation, qp_error *err) {
-    const size_t n_factors = 6 * (size_t)frame->surface->mesh->n_patches;
+    const qp_mesh *mesh = frame->surface->mesh;
     qp_frame_drop_layout(frame);
-    free(frame->patch_factors);
-    frame->patch_factors = NULL;
-    if (tessellation->patch_factors != NULL) {
-        frame->patch_factors = qp_alloc(n_factors, sizeof(float), false);
-        if (frame->patch_factors == NULL)
-            return qp_fail_memory(err, n_factors * sizeof(float), "tessellation factors");
-        memcpy(frame->patch_factors, tessellation->patch_factors, n_factors * sizeof(float));
-    }
+    qp_status kept =
+        keep_factors(&frame->patch_factors, tessellation->patch_factors, 6 * (size_t)mesh->n_patches, err);
+    if (kept == QP_OK) kept = keep_factors(&frame->edge_factors, tessellation->edge_factors, mesh->n_edges, err);
+    if (kept != QP_OK) return kept;
     frame->tessellation = *tessellation;
     frame->tessellation.patch_factors = frame->patch_factors;
-    qp_status status = qp_layout_tessellate(frame->surface, tessellation, frame->options.want_triangles,
-                                            &frame->layout, err);
+    frame->tessellation.edge_factors = frame->edge_factors;
+    qp_status status = qp_layout_tessellate(frame->surface, tessellation, frame->share,
+                                            frame->options.want_triangles, &frame->layout, err);
+    if (status == QP_OK) status = qp_frame_deepen(frame, err);
     if (status == QP_OK) status = qp_frame_upload_layout(frame, err);
     if (status == QP_OK)
         frame->tessellated = true;
@@ -303,7 +266,8 @@ qp_status qp_frame_eval_points(qp_frame *frame, uint64_t count, const uint32_t *
                                qp_stream *stream, qp_error *err) {
     *stream = (qp_stream){0};
     qp_frame_drop_layout(frame);
-    qp_status status = qp_layout_points(frame->surface, count, patch, uv, &frame->layout, err);
+    qp_status status = qp_layout_points(frame->surface, count, patch, uv, frame->share, &frame->layout, err);
+    if (status == QP_OK) status = qp_frame_deepen(frame, err);
     if (status == QP_OK) status = qp_frame_upload_layout(frame, err);
     if (status == QP_OK) return evaluate(frame, stream, err);
     qp_frame_drop_layout(frame);

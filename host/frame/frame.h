@@ -3,7 +3,11 @@
 #define QP_FRAME_FRAME_H
 
 #include "host/device/device.h"
+#include "host/frame/share.h"
 #include "host/plan/plan.h"
+
+#include <float.h>
+#include <math.h>
 
 #include <math.h>
 
@@ -15,28 +19,31 @@ typedef struct qp_frame_item {
     uint64_t out;   /* first sample in the stream */
 } qp_frame_item;
 
-/* What to evaluate. Items are in order of .out and cover the stream without gaps; several may share a grid.
- */
+/* What to evaluate. Items are in order of .out and cover n_evaluated samples without gaps; several may share a grid, and a patch may
+ * have several. Samples that are evaluated only for others to copy are no part of the stream: they lie behind its n_samples, or,
+ * where there is an `order`, anywhere. */
 typedef struct qp_frame_layout {
     size_t n_items;
     qp_frame_item *items;
     size_t grid_points;
-    double *grid_u, *grid_v; /* [grid_points] in [0,1]; upload turns them into signed coordinates */
+    double *grid_u, *grid_v; /* [grid_points] in [0,1], or, with the sign bit set, signed already; upload rounds and signs them */
     uint64_t n_samples, n_triangles;
     float *uv;              /* [2 * n_samples] */
     uint32_t *sample_patch; /* [n_samples] */
     uint32_t *triangles;    /* [3 * n_triangles], NULL unless asked for */
     uint64_t *order;        /* sample i of the caller is sample order[i] of the items; NULL: the same */
+    uint64_t n_evaluated;   /* n_samples, and those that are there to be copied */
+    qp_copies copies;       /* once all are evaluated */
 } qp_frame_layout;
 
-/* The tessellator's points of every patch that has a surface. With a uniform factor f and n-gons in the mesh:
- * see layout.c. Errors: QP_BAD_INPUT for a factor that is not in [1, 64], QP_SYSTEM for memory. */
+/* The tessellator's points of every patch that has a surface; factors.h says with which factors. share: NULL for none. Errors:
+ * QP_BAD_INPUT for a factor that is not in [1, 64], QP_SYSTEM for memory. */
 qp_status qp_layout_tessellate(const qp_surface *surface, const qp_tessellation *tessellation,
-                               bool want_triangles, qp_frame_layout *layout, qp_error *err);
+                               const qp_share *share, bool want_triangles, qp_frame_layout *layout, qp_error *err);
 /* Any points, grouped by patch. Errors: QP_BAD_INPUT names the first point that is none of a patch with a
  * surface. */
 qp_status qp_layout_points(const qp_surface *surface, uint64_t count, const uint32_t *patch, const double *uv,
-                           qp_frame_layout *layout, qp_error *err);
+                           const qp_share *share, qp_frame_layout *layout, qp_error *err);
 void qp_layout_free(qp_frame_layout *layout);
 
 /* A run of items whose samples fit a buffer of the device, and whose control points fit the scratch buffer.
@@ -48,19 +55,31 @@ typedef struct qp_frame_batch {
     qp_buffer vertices, flags, derivatives;
 } qp_frame_batch;
 
+/* Steps of depth in which plans deeper than the surface's are made on demand (plans.c). */
+enum { QP_DEEP_STEPS = 4 };
+
 struct qp_frame {
     qp_device *device;
     const qp_surface *surface;
     qp_frame_options options;
     size_t real_size;
     qp_program program;
-    qp_buffer heads, trees, reals, rings, positions; /* of the surface */
+    bool built;          /* program is, for plans with plan_flags */
+    uint32_t plan_flags; /* QP_PLAN_* */
+    qp_buffer heads, trees, reals, rings, positions; /* of the surfaces */
+    bool plans_uploaded;
+    qp_surface *deep[QP_DEEP_STEPS]; /* deeper plans, for the patches that ever needed them; NULL: none */
+    uint8_t *patch_step;             /* [n_patches] of the layout: 0 the surface's plans, s those of deep[s - 1]; NULL: all 0 */
+    uint32_t n_plans, first_plan[1 + QP_DEEP_STEPS]; /* on the device; those of each step */
+    uint64_t first_ring[1 + QP_DEEP_STEPS];
     qp_buffer entries, grid_u, grid_v, support;      /* of the layout */
 
     qp_frame_layout layout;
     bool tessellated; /* layout is of the tessellation below, and everything is uploaded */
     qp_tessellation tessellation;
     float *patch_factors; /* copy, or NULL */
+    float *edge_factors;  /* likewise */
+    qp_share *share;      /* NULL with no_sharing */
     size_t n_batches;
     qp_frame_batch *batches;
     uint64_t peak_points;
@@ -75,17 +94,43 @@ struct qp_frame {
     size_t ordered_bytes;
 };
 
+/* How a patch of the layout is evaluated: its plan, its index in heads, and where its 1-ring begins in rings. */
+typedef struct qp_frame_plan {
+    const qp_plan *plan;
+    uint32_t index;
+    uint8_t rotation;
+    uint64_t ring;
+} qp_frame_plan;
+qp_frame_plan qp_frame_plan_of(const qp_frame *frame, uint32_t patch);
+
+/* Chooses the plans for the layout's samples, makes deeper ones where they are needed, and uploads what is new. To be called for
+ * every layout before qp_frame_upload_layout. */
+qp_status qp_frame_deepen(qp_frame *frame, qp_error *err);
+void qp_frame_drop_deep(qp_frame *frame);
+/* Builds the kernels and uploads the plans of all surfaces. */
+qp_status qp_frame_upload_plans(qp_frame *frame, qp_error *err);
+/* Room for `bytes` in a buffer, and their copy there. */
+qp_status qp_frame_upload(qp_frame *frame, qp_buffer *buffer, const void *from, size_t bytes,
+                          const char *what, qp_error *err);
+
 /* Cuts the layout into batches and uploads it. */
 qp_status qp_frame_upload_layout(qp_frame *frame, qp_error *err);
 /* Frees what qp_frame_upload_layout made, buffers that can be used again apart. */
 void qp_frame_drop_layout(qp_frame *frame);
 
 /* A coordinate in [0,1] as the device holds it (kernels/frame_layout.h), in the frame's precision: by the distance to the nearer
- * end, with the sign bit set for 1. */
+ * end, with the sign bit set for 1. One that has the sign bit is signed already. */
 static inline double qp_signed_coordinate(double x, qp_precision precision) {
-    double s = x <= 0.5 ? x : -(1.0 - x);
+    double s = x <= 0.5 || signbit(x) != 0 ? x : -(1.0 - x);
     if (precision == QP_FLOAT) s = (double)(float)s;
+    /* Some devices flush denormal numbers: all take them for the end itself. */
+    if (fabs(s) < (precision == QP_FLOAT ? (double)FLT_MIN : DBL_MIN)) s = copysign(0.0, s);
     return s == -0.5 ? 0.5 : s;
+}
+
+/* A coordinate of the layout's grids, likewise. */
+static inline double qp_frame_coordinate(const qp_frame *frame, double x) {
+    return qp_signed_coordinate(x, frame->options.precision);
 }
 
 /* Is this patch evaluated by the fast pass? */

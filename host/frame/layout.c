@@ -1,16 +1,6 @@
-/* What a frame evaluates: the tessellator's points of every patch.
- *
- * Uniform factor f and n-gons. The children of an n-gon each span half of a base edge, so that one of its edges
- * has a vertex in the middle and the quad beyond it must have one too (the 2k / 4k rule). With m segments along
- * every edge of a child, the quad takes 2m along an edge that it shares with an n-gon, and f along the others.
- *
- * - equal, fractional_even: m = f / 2 rounded up to a power of two (at least 2 for fractional_even). No cracks.
- *   Other numbers would leave some, for the tessellator rounds i / m and i / 2m to 16 bits after the point, each
- *   on its own.
- * - fractional_odd: m = f / 2. No odd number of segments is twice another, so edges between quads and n-gons do
- *   not match; all others do.
- *
- * An f that is a power of two, 4 or more, thus gives quads f along every edge and children f / 2. */
+/* What a frame evaluates: the tessellator's points of every patch, or any points; and, behind or between them, samples that are
+ * evaluated only for others to copy (share.h). */
+#include "host/frame/factors.h"
 #include "host/frame/frame.h"
 #include "host/frame/tessellator.h"
 #include "kernels/frame_layout.h"
@@ -19,12 +9,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { FACTORS = 6 };
+/* What a grid depends on: outer factors 0..3, inner factors u, v, and WHOLE or which quarter of its patch it covers. */
+enum { FACTORS = 7, WHOLE = 4 };
 static const uint32_t no_grid = QP_NONE;
 
-/* Distinct factor sextuples, by a hash table of indices. */
+/* Distinct grids, by a hash table of indices. */
 typedef struct grid_table {
-    float *factors; /* [FACTORS * count]: outer 0..3, inner u, v */
+    float *factors; /* [FACTORS * count] */
     size_t count, factor_capacity;
     uint32_t *slots; /* [n_slots], a power of two, or no_grid */
     size_t n_slots;
@@ -45,7 +36,7 @@ static bool table_resize(grid_table *table, size_t n_slots) {
     return true;
 }
 
-/* Index of a sextuple, or no_grid when memory is out. */
+/* Index of a grid, or no_grid when memory is out. */
 static uint32_t table_find(grid_table *table, const float factors[FACTORS]) {
     const size_t bytes = FACTORS * sizeof(float);
     if (2 * (table->count + 1) > table->n_slots &&
@@ -64,31 +55,33 @@ static uint32_t table_find(grid_table *table, const float factors[FACTORS]) {
     return table->slots[s];
 }
 
-/* Segments of a child of an n-gon, see above. */
-static float child_factor(qp_spacing spacing, float f) {
-    if (spacing == QP_FRACTIONAL_ODD) return f / 2;
-    float m = spacing == QP_FRACTIONAL_EVEN ? 2 : 1;
-    while (m < f / 2) m *= 2;
-    return m;
-}
-
-/* Marks the edges of faces that are not quads. NULL when memory is out. */
-static uint8_t *mark_edges_of_ngons(const qp_mesh *mesh) {
-    uint8_t *marks = qp_alloc(mesh->n_edges, 1, true);
-    if (marks == NULL) return NULL;
-    for (uint32_t h = 0; h < mesh->n_corners; ++h) {
-        if (qp_face_size(mesh, mesh->corner_face[h]) != 4) marks[mesh->corner_edge[h]] = 1;
-    }
-    return marks;
-}
-
 typedef struct grid_job {
     const grid_table *table;
     qp_spacing spacing;
     qp_tess_grid *grids;
+    qp_rim *rims;
     qp_error error; /* of one of the failures, if any; written under the lock of `failed` */
     int failed;
 } grid_job;
+
+/* The points on the rim, which come first and run around counter-clockwise, whole patches assumed. */
+static qp_rim find_rim(const qp_tess_grid *grid) {
+    qp_rim rim = {0};
+    for (; rim.count < grid->n_points; ++rim.count) {
+        const float u = grid->uv[2 * (size_t)rim.count], v = grid->uv[2 * (size_t)rim.count + 1];
+        const bool at_u = u == 0 || u == 1, at_v = v == 0 || v == 1;
+        if (!at_u && !at_v) break;
+        if (at_u && at_v) rim.corner[v == 0 ? (u == 0 ? 0 : 1) : (u == 0 ? 3 : 2)] = rim.count;
+    }
+    return rim;
+}
+
+/* From a quarter's (u,v) to its patch's; exact, for the tessellator's points are multiples of 2^-16. */
+static void place_quarter(qp_tess_grid *grid, unsigned quarter) {
+    const float add[2] = {(float)(quarter & 1u), (float)(quarter >> 1)};
+    for (size_t i = 0; i < 2 * (size_t)grid->n_points; ++i)
+        grid->uv[i] = 0.5f * (grid->uv[i] + add[i & 1u]);
+}
 
 static void make_grids(void *context, size_t begin, size_t end, unsigned worker) {
     grid_job *job = context;
@@ -96,61 +89,53 @@ static void make_grids(void *context, size_t begin, size_t end, unsigned worker)
     for (size_t i = begin; i < end; ++i) {
         const float *f = job->table->factors + FACTORS * i;
         qp_error error;
-        if (qp_tessellate(job->spacing, f, f + 4, &job->grids[i], &error) == QP_OK) continue;
+        if (qp_tessellate(job->spacing, f, f + 4, &job->grids[i], &error) == QP_OK) {
+            job->rims[i] = find_rim(&job->grids[i]);
+            if (f[6] < WHOLE) place_quarter(&job->grids[i], (unsigned)f[6]);
+            continue;
+        }
         if (__atomic_exchange_n(&job->failed, 1, __ATOMIC_RELAXED) == 0) job->error = error;
         return;
     }
 }
 
-/* The grid of every patch of the mesh in *patch_grid (malloced), no_grid where it has no samples. */
-static qp_status assign_grids(const qp_surface *surface, const qp_tessellation *tess, grid_table *table,
-                              uint32_t **patch_grid, qp_error *err) {
-    const qp_mesh *mesh = surface->mesh;
-    uint8_t *marks = NULL;
-    *patch_grid = qp_alloc(mesh->n_patches, sizeof **patch_grid, false);
-    if (*patch_grid == NULL)
-        return qp_fail_memory(err, mesh->n_patches * sizeof **patch_grid, "grids of patches");
-    if (tess->patch_factors == NULL && (marks = mark_edges_of_ngons(mesh)) == NULL)
-        return qp_fail_memory(err, mesh->n_edges, "edges of n-gons");
-    qp_status status = QP_OK;
-    const float m = child_factor(tess->spacing, tess->factor);
-    for (uint32_t face = 0; face < mesh->n_faces && status == QP_OK; ++face) {
-        for (uint32_t p = mesh->patch_offsets[face]; p < mesh->patch_offsets[face + 1]; ++p) {
+/* The grid of every part in *part_grid (malloced). */
+static qp_status assign_grids(uint32_t n_patches, const qp_part_factors *factors, grid_table *table,
+                              uint32_t **part_grid, qp_error *err) {
+    const uint64_t n_parts = factors->first[n_patches];
+    *part_grid = qp_alloc((size_t)n_parts, sizeof **part_grid, false);
+    if (*part_grid == NULL) return qp_fail_memory(err, (size_t)n_parts * sizeof **part_grid, "grids of patches");
+    for (uint32_t p = 0; p < n_patches; ++p) {
+        const uint64_t first = factors->first[p], end = factors->first[p + 1];
+        for (uint64_t i = first; i < end; ++i) {
             float f[FACTORS];
-            (*patch_grid)[p] = no_grid;
-            if (surface->patch_plan[p] == QP_NONE) continue;
-            if (tess->patch_factors != NULL) {
-                memcpy(f, tess->patch_factors + FACTORS * (size_t)p, sizeof f);
-            } else {
-                const bool quad = qp_face_size(mesh, face) == 4;
-                for (int i = 0; i < FACTORS; ++i) f[i] = quad ? tess->factor : m;
-                /* Outer 0..3 lie on u=0, v=0, u=1, v=1: the face's edges 3, 0, 1, 2. */
-                for (uint32_t i = 0; i < 4 && quad; ++i) {
-                    uint32_t corner = mesh->face_offsets[face] + (i + 3) % 4;
-                    if (marks[mesh->corner_edge[corner]]) f[i] = 2 * m;
-                }
-            }
-            /* Written so that NaN is discarded. */
-            if (!(f[0] > 0 && f[1] > 0 && f[2] > 0 && f[3] > 0)) continue;
-            for (int i = 4; i < FACTORS; ++i) {
-                if (!(f[i] >= 1)) f[i] = 1; /* as the tessellator clamps; a NaN would never be found again */
-            }
-            (*patch_grid)[p] = table_find(table, f);
-            if ((*patch_grid)[p] == no_grid) {
-                status = qp_fail_memory(err, FACTORS * sizeof(float) * table->count, "tessellation factors");
-                break;
-            }
+            memcpy(f, factors->values + 6 * (size_t)i, 6 * sizeof *f);
+            f[6] = end - first == 1 ? WHOLE : (float)(i - first);
+            (*part_grid)[i] = table_find(table, f);
+            if ((*part_grid)[i] == no_grid)
+                return qp_fail_memory(err, FACTORS * sizeof(float) * table->count, "tessellation factors");
         }
     }
-    free(marks);
-    return status;
+    return QP_OK;
 }
+
+/* The grids of a tessellation, while it is laid out. */
+typedef struct tessellation {
+    const qp_surface *surface;
+    const qp_share *share; /* or NULL */
+    qp_part_factors factors;
+    grid_table table;
+    uint32_t *part_grid;
+    qp_tess_grid *grids; /* [table.count], as the next ones */
+    qp_rim *rims;
+    uint64_t *grid_first; /* in the layout's grids */
+    uint32_t *levels;
+    uint64_t *part_triangle; /* first triangle of each part */
+} tessellation;
 
 typedef struct fill_job {
     const qp_frame_layout *layout;
-    const qp_tess_grid *grids;
-    const uint32_t *item_grid;
-    const uint64_t *item_triangle;
+    const tessellation *tess;
 } fill_job;
 
 /* Expands the grids of some items into the stream's arrays. */
@@ -160,11 +145,11 @@ static void fill_items(void *context, size_t begin, size_t end, unsigned worker)
     (void)worker;
     for (size_t i = begin; i < end; ++i) {
         const qp_frame_item *item = &layout->items[i];
-        const qp_tess_grid *grid = &job->grids[job->item_grid[i]];
+        const qp_tess_grid *grid = &job->tess->grids[job->tess->part_grid[i]];
         memcpy(layout->uv + 2 * item->out, grid->uv, 2 * sizeof(float) * item->samples);
         for (uint32_t s = 0; s < item->samples; ++s) layout->sample_patch[item->out + s] = item->patch;
         if (layout->triangles == NULL) continue;
-        uint32_t *out = layout->triangles + 3 * job->item_triangle[i];
+        uint32_t *out = layout->triangles + 3 * job->tess->part_triangle[i];
         for (size_t t = 0; t < 3 * (size_t)grid->n_triangles; ++t)
             out[t] = (uint32_t)item->out + grid->triangles[t];
     }
@@ -188,86 +173,149 @@ static qp_status alloc_layout(qp_frame_layout *layout, bool want_triangles, qp_e
     return QP_OK;
 }
 
-/* Items from the grids of the patches, and the arrays filled. */
-static qp_status expand(const qp_mesh *mesh, const uint32_t *patch_grid, const qp_tess_grid *grids,
-                        size_t n_grids, bool want_triangles, qp_frame_layout *layout, qp_error *err) {
-    uint64_t *grid_first = qp_alloc(n_grids, sizeof *grid_first, false);
-    uint32_t *levels = qp_alloc(n_grids, sizeof *levels, false);
-    uint32_t *item_grid = qp_alloc(mesh->n_patches, sizeof *item_grid, false);
-    uint64_t *item_triangle = qp_alloc(mesh->n_patches, sizeof *item_triangle, false);
-    layout->items = qp_alloc(mesh->n_patches, sizeof *layout->items, false);
-    qp_status status = QP_OK;
-    if (grid_first == NULL || levels == NULL || item_grid == NULL || item_triangle == NULL ||
-        layout->items == NULL) {
-        status = qp_fail_memory(err, mesh->n_patches * sizeof *layout->items, "the patches of a frame");
-        goto done;
+/* An item a part. */
+static void make_items(tessellation *t, qp_frame_layout *layout) {
+    const uint32_t n_patches = t->surface->mesh->n_patches;
+    for (size_t g = 0; g < t->table.count; ++g) {
+        uint32_t level = qp_tess_grid_level(&t->grids[g]);
+        t->levels[g] = level < QP_LEVELS ? level : QP_LEVELS - 1;
+        t->grid_first[g] = layout->grid_points;
+        layout->grid_points += t->grids[g].n_points;
     }
-    for (size_t g = 0; g < n_grids; ++g) {
-        uint32_t level = qp_tess_grid_level(&grids[g]);
-        levels[g] = level < QP_LEVELS ? level : QP_LEVELS - 1;
-        grid_first[g] = layout->grid_points;
-        layout->grid_points += grids[g].n_points;
-    }
-    for (uint32_t p = 0; p < mesh->n_patches; ++p) {
-        uint32_t g = patch_grid[p];
-        if (g == no_grid || grids[g].n_points == 0) continue;
-        item_grid[layout->n_items] = g;
-        item_triangle[layout->n_items] = layout->n_triangles;
-        layout->items[layout->n_items++] =
-            (qp_frame_item){p, grids[g].n_points, levels[g], grid_first[g], layout->n_samples};
-        layout->n_samples += grids[g].n_points;
-        layout->n_triangles += grids[g].n_triangles;
-    }
-    if (want_triangles && layout->n_samples > UINT32_MAX) {
-        status = qp_fail(err, QP_BAD_INPUT, "%llu samples are too many for triangles of 32-bit indices",
-                         (unsigned long long)layout->n_samples);
-        goto done;
-    }
-    status = alloc_layout(layout, want_triangles, err);
-    if (status != QP_OK) goto done;
-    for (size_t g = 0; g < n_grids; ++g) {
-        for (size_t i = 0; i < grids[g].n_points; ++i) {
-            layout->grid_u[grid_first[g] + i] = (double)grids[g].uv[2 * i];
-            layout->grid_v[grid_first[g] + i] = (double)grids[g].uv[2 * i + 1];
+    for (uint32_t p = 0; p < n_patches; ++p) {
+        for (uint64_t i = t->factors.first[p]; i < t->factors.first[p + 1]; ++i) {
+            const uint32_t g = t->part_grid[i];
+            t->part_triangle[i] = layout->n_triangles;
+            layout->items[layout->n_items++] =
+                (qp_frame_item){p, t->grids[g].n_points, t->levels[g], t->grid_first[g], layout->n_samples};
+            layout->n_samples += t->grids[g].n_points;
+            layout->n_triangles += t->grids[g].n_triangles;
         }
     }
-    fill_job job = {layout, grids, item_grid, item_triangle};
-    qp_parallel(layout->n_items, 64, fill_items, &job);
-done:
-    free(grid_first);
-    free(levels);
-    free(item_grid);
-    free(item_triangle);
+}
+
+/* The copies of the layout, and the ghosts they need. */
+static qp_status share_samples(const tessellation *t, qp_frame_layout *layout, qp_ghosts *ghosts,
+                               qp_error *err) {
+    *ghosts = (qp_ghosts){0};
+    if (t->share == NULL) return QP_OK;
+    qp_share_part *parts = qp_alloc(layout->n_items, sizeof *parts, false);
+    if (parts == NULL) return qp_fail_memory(err, layout->n_items * sizeof *parts, "shared samples");
+    for (size_t i = 0; i < layout->n_items; ++i) {
+        const uint32_t g = t->part_grid[i];
+        parts[i] = (qp_share_part){layout->items[i].out, t->grids[g].uv, &t->rims[g]};
+    }
+    qp_status status = qp_share_tessellation(t->share, t->factors.first, parts, &layout->copies, ghosts, err);
+    free(parts);
     return status;
 }
 
-qp_status qp_layout_tessellate(const qp_surface *surface, const qp_tessellation *tess, bool want_triangles,
-                               qp_frame_layout *layout, qp_error *err) {
+typedef struct ghost_place {
+    uint32_t patch;
+    size_t ghost;
+} ghost_place;
+
+static int by_patch(const void *a, const void *b) {
+    const ghost_place *x = a, *y = b;
+    if (x->patch != y->patch) return x->patch < y->patch ? -1 : 1;
+    return x->ghost < y->ghost ? -1 : x->ghost > y->ghost;
+}
+
+/* Puts the ghosts behind the stream, an item a patch, and names their places in the copies. */
+static qp_status place_ghosts(const qp_ghosts *ghosts, uint64_t first_point, qp_frame_layout *layout,
+                              qp_error *err) {
+    ghost_place *places = qp_alloc(ghosts->count, sizeof *places, false);
+    uint64_t *at = qp_alloc(ghosts->count, sizeof *at, false);
+    qp_frame_item *items = realloc(layout->items, (layout->n_items + ghosts->count + 1) * sizeof *items);
+    if (items != NULL) layout->items = items;
+    if (places == NULL || at == NULL || items == NULL) {
+        free(places);
+        free(at);
+        return qp_fail_memory(err, ghosts->count * sizeof *items, "shared samples");
+    }
+    for (size_t i = 0; i < ghosts->count; ++i) places[i] = (ghost_place){ghosts->list[i].patch, i};
+    qsort(places, ghosts->count, sizeof *places, by_patch);
+    for (size_t i = 0; i < ghosts->count; ++i) {
+        const qp_ghost *ghost = &ghosts->list[places[i].ghost];
+        at[places[i].ghost] = layout->n_samples + i;
+        layout->grid_u[first_point + i] = ghost->u;
+        layout->grid_v[first_point + i] = ghost->v;
+        if (i == 0 || places[i].patch != places[i - 1].patch)
+            items[layout->n_items++] =
+                (qp_frame_item){ghost->patch, 0, QP_LEVELS - 1, first_point + i, layout->n_samples + i};
+        ++items[layout->n_items - 1].samples;
+    }
+    for (size_t i = 0; i < layout->copies.count; ++i) {
+        qp_copy *copy = &layout->copies.list[i];
+        if (copy->from >= QP_SHARE_GHOST) copy->from = at[copy->from - QP_SHARE_GHOST];
+    }
+    free(places);
+    free(at);
+    return QP_OK;
+}
+
+/* Items from the grids of the parts, and the arrays filled. */
+static qp_status expand(tessellation *t, bool want_triangles, qp_frame_layout *layout, qp_error *err) {
+    const size_t n_grids = t->table.count, n_parts = (size_t)t->factors.first[t->surface->mesh->n_patches];
+    t->grid_first = qp_alloc(n_grids, sizeof *t->grid_first, false);
+    t->levels = qp_alloc(n_grids, sizeof *t->levels, false);
+    t->part_triangle = qp_alloc(n_parts, sizeof *t->part_triangle, false);
+    layout->items = qp_alloc(n_parts, sizeof *layout->items, false);
+    if (t->grid_first == NULL || t->levels == NULL || t->part_triangle == NULL || layout->items == NULL)
+        return qp_fail_memory(err, n_parts * sizeof *layout->items, "the patches of a frame");
+    make_items(t, layout);
+    if (want_triangles && layout->n_samples > UINT32_MAX)
+        return qp_fail(err, QP_BAD_INPUT, "%llu samples are too many for triangles of 32-bit indices",
+                       (unsigned long long)layout->n_samples);
+    const uint64_t first_ghost_point = layout->grid_points;
+    const size_t n_items = layout->n_items;
+    qp_ghosts ghosts;
+    qp_status status = share_samples(t, layout, &ghosts, err);
+    layout->grid_points += ghosts.count;
+    layout->n_evaluated = layout->n_samples + ghosts.count;
+    if (status == QP_OK) status = alloc_layout(layout, want_triangles, err);
+    for (size_t g = 0; g < n_grids && status == QP_OK; ++g) {
+        for (size_t i = 0; i < t->grids[g].n_points; ++i) {
+            layout->grid_u[t->grid_first[g] + i] = (double)t->grids[g].uv[2 * i];
+            layout->grid_v[t->grid_first[g] + i] = (double)t->grids[g].uv[2 * i + 1];
+        }
+    }
+    if (status == QP_OK && ghosts.count != 0) status = place_ghosts(&ghosts, first_ghost_point, layout, err);
+    free(ghosts.list);
+    if (status != QP_OK) return status;
+    fill_job job = {layout, t};
+    qp_parallel(n_items, 64, fill_items, &job);
+    return QP_OK;
+}
+
+qp_status qp_layout_tessellate(const qp_surface *surface, const qp_tessellation *tess, const qp_share *share,
+                               bool want_triangles, qp_frame_layout *layout, qp_error *err) {
     *layout = (qp_frame_layout){0};
-    if (tess->patch_factors == NULL && !(tess->factor >= 1 && tess->factor <= 64))
-        return qp_fail(err, QP_BAD_INPUT, "tessellation factor %g is not between 1 and 64",
-                       (double)tess->factor);
-    if (tess->spacing != QP_EQUAL && tess->spacing != QP_FRACTIONAL_EVEN &&
-        tess->spacing != QP_FRACTIONAL_ODD)
-        return qp_fail(err, QP_BAD_INPUT, "unknown spacing %d", (int)tess->spacing);
-    grid_table table = {0};
-    uint32_t *patch_grid = NULL;
-    qp_tess_grid *grids = NULL;
-    qp_status status = assign_grids(surface, tess, &table, &patch_grid, err);
-    if (status == QP_OK && (grids = qp_alloc(table.count, sizeof *grids, true)) == NULL)
-        status = qp_fail_memory(err, table.count * sizeof *grids, "tessellation grids");
+    tessellation t = {.surface = surface, .share = share};
+    qp_status status = qp_factors_make(surface, tess, &t.factors, err);
+    if (status == QP_OK) status = assign_grids(surface->mesh->n_patches, &t.factors, &t.table, &t.part_grid, err);
     if (status == QP_OK) {
-        grid_job job = {.table = &table, .spacing = tess->spacing, .grids = grids};
-        qp_parallel(table.count, 16, make_grids, &job);
+        t.grids = qp_alloc(t.table.count, sizeof *t.grids, true);
+        t.rims = qp_alloc(t.table.count, sizeof *t.rims, false);
+        if (t.grids == NULL || t.rims == NULL)
+            status = qp_fail_memory(err, t.table.count * sizeof *t.grids, "tessellation grids");
+    }
+    if (status == QP_OK) {
+        grid_job job = {.table = &t.table, .spacing = tess->spacing, .grids = t.grids, .rims = t.rims};
+        qp_parallel(t.table.count, 16, make_grids, &job);
         if (job.failed) status = qp_fail(err, job.error.status, "%s", job.error.message);
     }
-    if (status == QP_OK)
-        status = expand(surface->mesh, patch_grid, grids, table.count, want_triangles, layout, err);
-    for (size_t i = 0; grids != NULL && i < table.count; ++i) qp_tess_grid_free(&grids[i]);
-    free(grids);
-    free(patch_grid);
-    free(table.factors);
-    free(table.slots);
+    if (status == QP_OK) status = expand(&t, want_triangles, layout, err);
+    for (size_t i = 0; t.grids != NULL && i < t.table.count; ++i) qp_tess_grid_free(&t.grids[i]);
+    qp_factors_free(&t.factors);
+    free(t.grids);
+    free(t.rims);
+    free(t.part_grid);
+    free(t.grid_first);
+    free(t.levels);
+    free(t.part_triangle);
+    free(t.table.factors);
+    free(t.table.slots);
     if (status != QP_OK) qp_layout_free(layout);
     return status;
 }
@@ -280,6 +328,7 @@ void qp_layout_free(qp_frame_layout *layout) {
     free(layout->sample_patch);
     free(layout->triangles);
     free(layout->order);
+    free(layout->copies.list);
     *layout = (qp_frame_layout){0};
 }
 
@@ -314,25 +363,39 @@ static void cut_into_items(uint32_t n_patches, const uint64_t *first, qp_frame_l
     }
 }
 
+/* The copies of points that lie on perimeters, with .to the number of the point. */
+static qp_status share_points(const qp_share *share, uint64_t count, const uint32_t *patch, const double *uv,
+                              qp_copies *copies, qp_ghosts *ghosts, qp_error *err) {
+    qp_status status = QP_OK;
+    for (uint64_t i = 0; share != NULL && i < count && status == QP_OK; ++i)
+        status = qp_share_point(share, patch[i], uv[2 * i], uv[2 * i + 1], i, copies, ghosts, err);
+    return status;
+}
+
+/* Points and ghosts go into the same items, so that all samples of a patch see the same plan. */
 qp_status qp_layout_points(const qp_surface *surface, uint64_t count, const uint32_t *patch, const double *uv,
-                           qp_frame_layout *layout, qp_error *err) {
+                           const qp_share *share, qp_frame_layout *layout, qp_error *err) {
     const uint32_t n_patches = surface->mesh->n_patches;
+    qp_ghosts ghosts = {0};
     *layout = (qp_frame_layout){0};
     if (count > SIZE_MAX / 64) return qp_fail_memory(err, SIZE_MAX, "points");
     qp_status status = check_points(surface, count, patch, uv, err);
-    if (status != QP_OK) return status;
+    if (status == QP_OK) status = share_points(share, count, patch, uv, &layout->copies, &ghosts, err);
+    const uint64_t total = count + ghosts.count;
     layout->n_samples = count;
-    layout->grid_points = (size_t)count;
-    status = alloc_layout(layout, false, err);
+    layout->n_evaluated = total;
+    layout->grid_points = (size_t)total;
+    if (status == QP_OK) status = alloc_layout(layout, false, err);
     /* first[p]: where patch p's points begin, then, while they are dealt out, where its next one goes. */
     uint64_t *first = qp_alloc((size_t)n_patches + 2, sizeof *first, true);
-    size_t most = n_patches + (size_t)(count / ITEM_SAMPLES);
+    size_t most = n_patches + (size_t)(total / ITEM_SAMPLES);
     layout->items = qp_alloc(most, sizeof *layout->items, false);
-    layout->order = qp_alloc((size_t)count, sizeof *layout->order, false);
+    layout->order = qp_alloc((size_t)total, sizeof *layout->order, false);
     if (status == QP_OK && (first == NULL || layout->items == NULL || layout->order == NULL))
-        status = qp_fail_memory(err, most * sizeof *layout->items + (size_t)count * 8, "points");
+        status = qp_fail_memory(err, most * sizeof *layout->items + (size_t)total * 8, "points");
     if (status != QP_OK) {
         free(first);
+        free(ghosts.list);
         qp_layout_free(layout);
         return status;
     }
@@ -340,18 +403,26 @@ qp_status qp_layout_points(const qp_surface *surface, uint64_t count, const uint
         for (size_t i = 0; i < 2 * (size_t)count; ++i) layout->uv[i] = (float)uv[i];
         memcpy(layout->sample_patch, patch, (size_t)count * sizeof(uint32_t));
     }
-    for (uint64_t i = 0; i < count; ++i) ++first[patch[i] + 2];
+    for (uint64_t i = 0; i < total; ++i) ++first[(i < count ? patch[i] : ghosts.list[i - count].patch) + 2];
     for (uint32_t p = 0; p < n_patches; ++p) first[p + 1] += first[p];
-    bool sorted = true;
-    for (uint64_t i = 0; i < count; ++i) {
-        uint64_t at = first[patch[i] + 1]++;
+    bool sorted = ghosts.count == 0;
+    for (uint64_t i = 0; i < total; ++i) {
+        const qp_ghost *ghost = i < count ? NULL : &ghosts.list[i - count];
+        uint64_t at = first[(ghost == NULL ? patch[i] : ghost->patch) + 1]++;
         layout->order[i] = at;
-        layout->grid_u[at] = uv[2 * i];
-        layout->grid_v[at] = uv[2 * i + 1];
+        /* + 0 makes +0 of -0, which would be signed. */
+        layout->grid_u[at] = ghost == NULL ? uv[2 * i] + 0.0 : ghost->u;
+        layout->grid_v[at] = ghost == NULL ? uv[2 * i + 1] + 0.0 : ghost->v;
         sorted = sorted && at == i;
+    }
+    for (size_t i = 0; i < layout->copies.count; ++i) {
+        qp_copy *copy = &layout->copies.list[i];
+        copy->to = layout->order[copy->to];
+        copy->from = layout->order[count + (copy->from - QP_SHARE_GHOST)];
     }
     cut_into_items(n_patches, first, layout);
     free(first);
+    free(ghosts.list);
     if (sorted) {
         free(layout->order);
         layout->order = NULL;

@@ -25,6 +25,7 @@ void qp_plan_free(qp_plan *plan) {
     free(plan->constants);
     free(plan->point_kinds);
     free(plan->point_origins);
+    free(plan->point_scales);
     free(plan);
 }
 
@@ -79,10 +80,10 @@ static void put_leaf(qp_builder *b, uint32_t level, const qp_item *item, int cre
 static void put_irregular(qp_builder *b, uint32_t level, const qp_item *item) {
     uint32_t node = qp_plan_new_node(b, 7);
     if (b->failed) return;
-    b->flags |= QP_PLAN_CORNERS;
+    b->flags |= QP_PLAN_CORNERS | QP_PLAN_IRREGULAR;
     b->tree[node] = QP_NODE_IRREGULAR;
     for (uint32_t i = 0; i < 4; ++i) {
-        uint32_t u = qp_plan_corner_high_u(i) ? item->u.hi : item->u.lo,
+        uint64_t u = qp_plan_corner_high_u(i) ? item->u.hi : item->u.lo,
                  v = qp_plan_corner_high_v(i) ? item->v.hi : item->v.lo;
         uint32_t out[3];
         qp_plan_limit_finals(b, level, &item->cell->corner[i], qp_plan_point_need(u, v), out);
@@ -112,7 +113,7 @@ static void put_internal(qp_builder *b, uint32_t level, const qp_item *item, qp_
      * with fewer irregular cells, which needs fewer points. Child order in the tree is (u, v) binary: corners
      * 0, 1, 3, 2. */
     static const uint8_t place[4] = {0, 1, 3, 2};
-    uint32_t mid_u = (item->u.lo + item->u.hi) / 2, mid_v = (item->v.lo + item->v.hi) / 2;
+    uint64_t mid_u = (item->u.lo + item->u.hi) / 2, mid_v = (item->v.lo + item->v.hi) / 2;
     bool irregular[4];
     for (uint32_t i = 0; i < 4; ++i) irregular[i] = !qp_cell_is_regular(&children[i]);
     bool tie_u = mid_u > QP_PLAN_ONE / 2, tie_v = mid_v > QP_PLAN_ONE / 2;

@@ -3,6 +3,14 @@
 
 #include <string.h>
 
+/* Marks a ring's point as an offset from `origin`. A ring shrinks by about half a level, so ring number k is handed to a device
+ * times 2^k: its weights stay near 1, where floats are normal numbers, however deep it lies. */
+static void make_offset(qp_builder *b, uint32_t point, uint32_t origin, uint32_t ring) {
+    b->points[point].origin = (uint16_t)origin;
+    b->points[point].scale = (uint8_t)ring;
+    qp_plan_lower_need(b, origin, b->points[point].need);
+}
+
 /* Writes a finished chain as a TERMINAL node; its tail's offset is written by link_node through the returned
  * word. With an origin its points become offsets from that point. */
 static uint32_t put_terminal(qp_builder *b, const qp_chain *chain, uint32_t origin) {
@@ -24,9 +32,8 @@ static uint32_t put_terminal(qp_builder *b, const qp_chain *chain, uint32_t orig
             bool seen = false;
             for (uint32_t l = 0; l < k && !seen; ++l) seen = chain->points[ring][l] == chain->points[ring][k];
             if (seen) continue;
-            b->points[chain->points[ring][k]].origin = (uint16_t)origin;
+            make_offset(b, chain->points[ring][k], origin, ring);
             double *row = qp_plan_final_row(b, chain->points[ring][k]);
-            qp_plan_lower_need(b, origin, b->points[chain->points[ring][k]].need);
             for (uint32_t w = 0; w < width; ++w) row[w] -= base[w];
         }
     }
@@ -204,12 +211,25 @@ static void add_tail_rings(qp_builder *b, uint32_t level, const qp_item *item, q
         uint32_t ring = chain->rings;
         add_ring(b, tail, level + 1, &at, children, chain);
         if (b->failed || b->too_large) return;
-        for (uint32_t k = 0; k < 24; ++k) {
-            b->points[chain->points[ring][k]].origin = (uint16_t)origin;
-            qp_plan_lower_need(b, origin, b->points[chain->points[ring][k]].need);
-        }
+        for (uint32_t k = 0; k < 24; ++k) make_offset(b, chain->points[ring][k], origin, ring);
         at = qp_plan_child_item(&at, children, chain->corner, tie_u, tie_v);
     }
+}
+
+/* How much a ring shrinks from one level to the next, once the modes that decay faster have vanished: the dominant eigenvalue of
+ * the corner, as the Rayleigh-like quotient of the last two rings' offsets (exact for a pure mode). 1/2 where there are no two. */
+static double tail_ratio(qp_builder *b, const qp_chain *chain) {
+    if (chain->rings < chain->offset_ring + 2) return 0.5;
+    double both = 0.0, before = 0.0;
+    for (uint32_t k = 0; k < 24; ++k) {
+        const double *last = qp_plan_final_row(b, chain->points[chain->rings - 1][k]);
+        const double *earlier = qp_plan_final_row(b, chain->points[chain->rings - 2][k]);
+        for (uint32_t w = 0; w < b->local.width; ++w) {
+            both += last[w] * earlier[w];
+            before += earlier[w] * earlier[w];
+        }
+    }
+    return before > 0.0 ? both / before : 0.5;
 }
 
 void qp_plan_put_tail(qp_builder *b, uint32_t level, qp_item *item) {
@@ -221,10 +241,14 @@ void qp_plan_put_tail(qp_builder *b, uint32_t level, qp_item *item) {
     add_tail_rings(b, level, item, chain, out[0]);
     if (b->failed || b->too_large) return;
     item->parent_word = put_terminal(b, chain, out[0]);
-    uint32_t node = qp_plan_new_node(b, 4);
+    uint32_t node = qp_plan_new_node(b, 5);
+    b->constants = qp_plan_grown(b, b->constants, &b->constant_capacity, (size_t)b->constant_count + 1,
+                                 sizeof *b->constants);
     if (b->failed) return;
     b->flags |= QP_PLAN_CORNERS;
-    b->tree[node] = QP_NODE_EXTRAORDINARY | corner << 3;
+    b->tree[node] = QP_NODE_EXTRAORDINARY | corner << 3 | (b->depth == QP_DEPTH_LIMIT ? QP_NODE_EXACT : 0u);
     for (uint32_t k = 0; k < 3; ++k) b->tree[node + 1 + k] = out[k];
+    b->tree[node + 4] = b->constant_count;
+    b->constants[b->constant_count++] = tail_ratio(b, &b->chains[item->chain]);
     qp_plan_link_node(b, item, node);
 }

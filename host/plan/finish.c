@@ -42,7 +42,8 @@ static void renumber_tree(qp_plan *plan, const uint32_t *index) {
             break;
         case QP_NODE_EXTRAORDINARY:
             for (uint32_t k = 1; k < 4; ++k) renumber_word(node + k, index);
-            at += 4;
+            node[4] += plan->point_count * plan->ring_size;
+            at += 5;
             break;
         default:
             renumber(node + 1, 6, index);
@@ -62,9 +63,11 @@ qp_plan *qp_plan_finish(qp_builder *b) {
         plan->constants = qp_alloc(b->constant_count, sizeof *plan->constants, false);
         plan->point_kinds = qp_alloc(count, 1, false);
         plan->point_origins = qp_alloc(count, sizeof *plan->point_origins, false);
+        plan->point_scales = qp_alloc(count, 1, false);
     }
     if (plan == NULL || index == NULL || plan->tree == NULL || plan->weights == NULL ||
-        plan->constants == NULL || plan->point_kinds == NULL || plan->point_origins == NULL) {
+        plan->constants == NULL || plan->point_kinds == NULL || plan->point_origins == NULL ||
+        plan->point_scales == NULL) {
         free(index);
         qp_plan_free(plan);
         b->failed = true;
@@ -76,6 +79,7 @@ qp_plan *qp_plan_finish(qp_builder *b) {
     plan->constant_count = b->constant_count;
     plan->node_count = b->node_count;
     plan->flags = b->flags;
+    plan->depth = b->depth;
     memcpy(plan->tree, b->tree, b->tree_words * sizeof *plan->tree);
     if (b->constant_count > 0) {
         memcpy(plan->constants, b->constants, b->constant_count * sizeof *plan->constants);
@@ -85,6 +89,7 @@ qp_plan *qp_plan_finish(qp_builder *b) {
         const qp_final_point *p = &b->points[i];
         index[p->order] = i;
         plan->point_kinds[i] = p->kind;
+        plan->point_scales[i] = p->scale;
         memcpy(plan->weights + (size_t)i * width, qp_plan_final_row(b, p->order), width * sizeof(double));
         for (uint32_t n = p->need; n < QP_LEVELS; ++n) ++plan->rows[n];
     }

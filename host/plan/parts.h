@@ -6,19 +6,20 @@
 
 #include "host/plan/build.h"
 
-/* Coordinates of the patch in units of 2^-24. */
-#define QP_PLAN_ONE 16777216u
+/* Coordinates of the patch in units of 2^-62, so that cells of the deepest level still have two ends. */
+#define QP_PLAN_ONE ((uint64_t)1 << 62)
 
 typedef struct qp_final_point {
     uint8_t need;    /* first level that needs it */
     uint8_t kind;    /* QP_POINT_* | depth << 2 */
     uint16_t origin; /* point its row is an offset from, or QP_NO_POINT */
+    uint8_t scale;   /* a device gets 2^scale times the row */
     uint32_t order;  /* becomes its index once sorted */
 } qp_final_point;
 
 /* One dimension of a cell: [lo, hi], and whether a sample at either end comes here or goes on. */
 typedef struct qp_span {
-    uint32_t lo, hi;
+    uint64_t lo, hi;
     bool own_lo, own_hi;
 } qp_span;
 
@@ -42,14 +43,14 @@ typedef struct qp_chain {
     uint32_t parent_word, corner, rings;
     uint32_t absolute_rings;             /* the first ones, whose points stay absolute */
     uint32_t offset_ring;                /* from this one on rows are offsets already */
-    uint32_t corner_u, corner_v;         /* of the patch, in 2^-24 */
+    uint64_t corner_u, corner_v;         /* of the patch, in units of 1 / QP_PLAN_ONE */
     uint32_t points[QP_DEPTH_LIMIT][24]; /* final points */
 } qp_chain;
 
 /* points.c */
 void *qp_plan_grown(qp_builder *b, void *block, size_t *capacity, size_t need, size_t size);
 uint8_t qp_plan_cell_need(qp_span u, qp_span v);
-uint8_t qp_plan_point_need(uint32_t u, uint32_t v);
+uint8_t qp_plan_point_need(uint64_t u, uint64_t v);
 qp_span qp_plan_half(qp_span s, bool upper, bool tie_low);
 bool qp_plan_corner_high_u(uint32_t i);
 bool qp_plan_corner_high_v(uint32_t i);

@@ -14,7 +14,9 @@ typedef struct qp_plan {
     double *weights;          /* [point_count * ring_size], row-major: a row is one stencil */
     uint8_t *point_kinds;     /* [point_count] what each point is (host/plan/build.h), for info */
     uint16_t *point_origins;  /* [point_count] point that a row is an offset from, or QP_NO_POINT */
-    double *constants; /* [constant_count]; a CREASE node's word 10 is index + point_count * ring_size */
+    uint8_t *point_scales;    /* [point_count] a device gets 2^scale times the row (exact) */
+    double *constants;        /* [constant_count]; nodes hold index + point_count * ring_size */
+    uint32_t depth;           /* deepest level stored; less than asked for where that took too many points */
 } qp_plan;
 
 struct qp_surface {
@@ -31,14 +33,19 @@ struct qp_surface {
     double build_ms;
 };
 
-/* All plans concatenated as plan_layout.h says; caller frees the three arrays with free(). */
+/* qp_surface_create for the patches p with mask[p] != 0 only (NULL: all); the others have no plan. */
+qp_status qp_surface_create_for(const qp_mesh *mesh, const qp_surface_options *options, const uint8_t *mask,
+                                qp_surface **surface, qp_error *err);
+
+/* All plans of some surfaces concatenated, one surface after the other, as plan_layout.h says; caller frees the three arrays with
+ * free(). */
 typedef struct qp_plan_pack {
     uint32_t *heads;
     uint32_t *tree;
     void *reals; /* float or double */
     size_t head_words, tree_words, real_count;
 } qp_plan_pack;
-qp_status qp_surface_pack(const qp_surface *surface, qp_precision precision, qp_plan_pack *pack,
-                          qp_error *err);
+qp_status qp_surface_pack(const qp_surface *const *surfaces, uint32_t n_surfaces, qp_precision precision,
+                          qp_plan_pack *pack, qp_error *err);
 
 #endif

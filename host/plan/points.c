@@ -14,7 +14,7 @@ void *qp_plan_grown(qp_builder *b, void *block, size_t *capacity, size_t need, s
 static uint8_t span_need(qp_span s) {
     if (s.lo == 0 || s.hi == QP_PLAN_ONE) return 0;
     for (uint32_t n = 1; n < QP_LEVELS; ++n) {
-        uint32_t step = QP_PLAN_ONE >> n, lo = s.lo > step ? s.lo : step,
+        uint64_t step = QP_PLAN_ONE >> n, lo = s.lo > step ? s.lo : step,
                  hi = s.hi < QP_PLAN_ONE - step ? s.hi : QP_PLAN_ONE - step;
         if (lo < hi) return (uint8_t)n;
         if (lo == hi && (lo != s.lo || s.own_lo) && (hi != s.hi || s.own_hi)) return (uint8_t)n;
@@ -29,12 +29,12 @@ uint8_t qp_plan_cell_need(qp_span u, qp_span v) {
     return a > b ? a : b;
 }
 
-uint8_t qp_plan_point_need(uint32_t u, uint32_t v) {
+uint8_t qp_plan_point_need(uint64_t u, uint64_t v) {
     return qp_plan_cell_need((qp_span){u, u, true, true}, (qp_span){v, v, true, true});
 }
 
 qp_span qp_plan_half(qp_span s, bool upper, bool tie_low) {
-    uint32_t mid = (s.lo + s.hi) / 2;
+    uint64_t mid = (s.lo + s.hi) / 2;
     if (upper) return (qp_span){mid, s.hi, !tie_low, s.own_hi};
     return (qp_span){s.lo, mid, s.own_lo, tie_low};
 }
@@ -60,7 +60,8 @@ uint32_t qp_plan_new_final(qp_builder *b, uint8_t need, uint32_t kind) {
         b->too_large = true;
         return 0;
     }
-    b->points[b->point_count] = (qp_final_point){need, (uint8_t)kind, QP_NO_POINT, b->point_count};
+    b->points[b->point_count] =
+        (qp_final_point){.need = need, .kind = (uint8_t)kind, .origin = QP_NO_POINT, .order = b->point_count};
     return b->point_count++;
 }
 

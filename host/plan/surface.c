@@ -92,13 +92,23 @@ static void regular_ring(const qp_mesh *m, uint32_t face, uint32_t ring[16]) {
     }
 }
 
-static bool enter_irregular(qp_surface *s, database *db, qp_gather *g, size_t *ring_capacity, uint32_t face) {
+static void enter_nothing(qp_surface *s, uint32_t patch) {
+    s->patch_plan[patch] = QP_NONE;
+    s->patch_ring[patch] = s->ring_entries;
+}
+
+static bool enter_irregular(qp_surface *s, database *db, qp_gather *g, const uint8_t *mask,
+                            size_t *ring_capacity, uint32_t face) {
     const qp_mesh *mesh = s->mesh;
     if (!qp_gather_face(g, mesh, face)) return false;
     bool child = g->n != 4;
     uint32_t patches = child ? g->n : 1;
     for (uint32_t k = 0; k < patches; ++k) {
         uint32_t patch = mesh->patch_offsets[face] + k, start = child ? k : qp_gather_canonical(g);
+        if (mask != NULL && !mask[patch]) {
+            enter_nothing(s, patch);
+            continue;
+        }
         if (!qp_gather_key(g, mesh, start, child) || !qp_gather_ring(g, mesh, start)) return false;
         uint32_t config = database_find(db, g, face, start, child);
         if (config == QP_NONE) return false;
@@ -110,18 +120,24 @@ static bool enter_irregular(qp_surface *s, database *db, qp_gather *g, size_t *r
     return true;
 }
 
-static bool enter_patches(qp_surface *s, database *db) {
+/* Does a face have a patch that is to be entered? */
+static bool is_wanted(const qp_mesh *mesh, const uint8_t *mask, uint32_t face) {
+    if (mesh->face_flags[face] & QP_FACE_HOLE) return false;
+    bool wanted = mask == NULL;
+    for (uint32_t p = mesh->patch_offsets[face]; p < mesh->patch_offsets[face + 1] && !wanted; ++p)
+        wanted = mask[p] != 0;
+    return wanted;
+}
+
+static bool enter_patches(qp_surface *s, const uint8_t *mask, database *db) {
     const qp_mesh *mesh = s->mesh;
     qp_gather gather = {0};
     size_t ring_capacity = 0;
     bool ok = true;
     for (uint32_t face = 0; face < mesh->n_faces && ok; ++face) {
         uint32_t first = mesh->patch_offsets[face];
-        if (mesh->face_flags[face] & QP_FACE_HOLE) {
-            for (uint32_t p = first; p < mesh->patch_offsets[face + 1]; ++p) {
-                s->patch_plan[p] = QP_NONE;
-                s->patch_ring[p] = s->ring_entries;
-            }
+        if (!is_wanted(mesh, mask, face)) {
+            for (uint32_t p = first; p < mesh->patch_offsets[face + 1]; ++p) enter_nothing(s, p);
         } else if (qp_face_is_regular(mesh, face)) {
             uint32_t ring[16];
             regular_ring(mesh, face, ring);
@@ -130,7 +146,7 @@ static bool enter_patches(qp_surface *s, database *db) {
             s->patch_ring[first] = s->ring_entries;
             ok = append_ring(s, &ring_capacity, ring, 16);
         } else {
-            ok = enter_irregular(s, db, &gather, &ring_capacity, face);
+            ok = enter_irregular(s, db, &gather, mask, &ring_capacity, face);
         }
     }
     qp_gather_free(&gather);
@@ -188,8 +204,9 @@ static qp_plan *regular_plan(void) {
     plan->constants = qp_alloc(0, sizeof *plan->constants, true);
     plan->point_kinds = qp_alloc(16, 1, true);
     plan->point_origins = qp_alloc(16, sizeof *plan->point_origins, false);
+    plan->point_scales = qp_alloc(16, 1, true);
     if (plan->tree == NULL || plan->weights == NULL || plan->constants == NULL || plan->point_kinds == NULL ||
-        plan->point_origins == NULL) {
+        plan->point_origins == NULL || plan->point_scales == NULL) {
         qp_plan_free(plan);
         return NULL;
     }
@@ -234,6 +251,11 @@ static bool build_plans(qp_surface *s, const database *db) {
 
 qp_status qp_surface_create(const qp_mesh *mesh, const qp_surface_options *options, qp_surface **surface,
                             qp_error *err) {
+    return qp_surface_create_for(mesh, options, NULL, surface, err);
+}
+
+qp_status qp_surface_create_for(const qp_mesh *mesh, const qp_surface_options *options, const uint8_t *mask,
+                                qp_surface **surface, qp_error *err) {
     *surface = NULL;
     double begin = qp_now_ms();
     qp_surface_options chosen = options != NULL ? *options : (qp_surface_options){0};
@@ -252,7 +274,7 @@ qp_status qp_surface_create(const qp_mesh *mesh, const qp_surface_options *optio
     s->patch_ring = qp_alloc(mesh->n_patches, sizeof *s->patch_ring, true);
     database db = {0};
     bool ok = s->patch_plan != NULL && s->patch_rotation != NULL && s->patch_ring != NULL;
-    ok = ok && enter_patches(s, &db) && build_plans(s, &db);
+    ok = ok && enter_patches(s, mask, &db) && build_plans(s, &db);
     database_free(&db);
     if (!ok) {
         qp_surface_free(s);
@@ -272,71 +294,4 @@ void qp_surface_free(qp_surface *s) {
     free(s->patch_ring);
     free(s->rings);
     free(s);
-}
-
-/* ---- packing for a device ---- */
-
-static void pack_reals(const qp_plan *plan, qp_precision precision, void *reals, size_t at) {
-    uint32_t rows = plan->point_count, width = plan->ring_size;
-    for (uint32_t i = 0; i < rows; ++i) {
-        const double *row = plan->weights + (size_t)i * width;
-        for (uint32_t j = 0; j < width; ++j) {
-            size_t to = at + (size_t)j * rows + i;
-            if (precision == QP_DOUBLE) {
-                ((double *)reals)[to] = row[j];
-            } else {
-                ((float *)reals)[to] = (float)row[j];
-            }
-        }
-    }
-    at += (size_t)rows * width;
-    for (uint32_t c = 0; c < plan->constant_count; ++c) {
-        if (precision == QP_DOUBLE) {
-            ((double *)reals)[at + c] = plan->constants[c];
-        } else {
-            ((float *)reals)[at + c] = (float)plan->constants[c];
-        }
-    }
-}
-
-qp_status qp_surface_pack(const qp_surface *surface, qp_precision precision, qp_plan_pack *pack,
-                          qp_error *err) {
-    *pack = (qp_plan_pack){.head_words = (size_t)surface->n_plans * QP_HEAD_WORDS};
-    for (uint32_t p = 0; p < surface->n_plans; ++p) {
-        const qp_plan *plan = surface->plans[p];
-        pack->tree_words += plan->tree_words;
-        pack->real_count += (size_t)plan->point_count * plan->ring_size + plan->constant_count;
-    }
-    if (pack->tree_words > UINT32_MAX || pack->real_count > UINT32_MAX) {
-        return qp_fail(err, QP_SYSTEM,
-                       "the plans of this surface hold more than 2^32 words; lower the depth");
-    }
-    size_t real_size = precision == QP_DOUBLE ? sizeof(double) : sizeof(float);
-    pack->heads = qp_alloc(pack->head_words, sizeof(uint32_t), true);
-    pack->tree = qp_alloc(pack->tree_words, sizeof(uint32_t), false);
-    pack->reals = qp_alloc(pack->real_count, real_size, false);
-    if (pack->heads == NULL || pack->tree == NULL || pack->reals == NULL) {
-        free(pack->heads);
-        free(pack->tree);
-        free(pack->reals);
-        size_t bytes = pack->real_count * real_size;
-        *pack = (qp_plan_pack){0};
-        return qp_fail_memory(err, bytes, "packed plans");
-    }
-    size_t tree = 0, reals = 0;
-    for (uint32_t p = 0; p < surface->n_plans; ++p) {
-        const qp_plan *plan = surface->plans[p];
-        uint32_t *head = pack->heads + (size_t)p * QP_HEAD_WORDS;
-        head[QP_HEAD_RING] = plan->ring_size;
-        head[QP_HEAD_POINTS] = plan->point_count;
-        head[QP_HEAD_TREE] = (uint32_t)tree;
-        head[QP_HEAD_REALS] = (uint32_t)reals;
-        head[QP_HEAD_FLAGS] = plan->flags;
-        memcpy(head + QP_HEAD_ROWS, plan->rows, sizeof plan->rows);
-        memcpy(pack->tree + tree, plan->tree, plan->tree_words * sizeof *plan->tree);
-        pack_reals(plan, precision, pack->reals, reals);
-        tree += plan->tree_words;
-        reals += (size_t)plan->point_count * plan->ring_size + plan->constant_count;
-    }
-    return QP_OK;
 }

@@ -16,7 +16,7 @@ for number in nan inf 1e999 0 65 -1 "" 4x 0x10; do
 done
 refuses "bad spacing" 2 "none of equal" eval "$cube" --spacing odd
 refuses "bad repeat" 2 "whole number" eval "$cube" --repeat 1.5
-refuses "bad depth" 2 "whole number from 1 to 24" info "$cube" --depth 25
+refuses "bad depth" 2 "whole number from 1 to 60" info "$cube" --depth 61
 refuses "flag with a value" 2 "takes no value" info "$cube" --json=1
 refuses "unknown kind" 2 "icosahedron" gen icosahedron -o "$work/x.obj"
 refuses "unknown kind in a mesh argument" 2 "icosahedron" info gen:icosahedron

@@ -23,6 +23,7 @@ typedef struct hand_plan {
     uint32_t ring[HAND_RING], tree[HAND_WORDS];
     double weights[HAND_POINTS * HAND_RING], constants[HAND_CONSTANTS];
     double positions[3 * HAND_RING];
+    uint8_t scales[HAND_POINTS];
 } hand_plan;
 
 static uint64_t hand_state = 1;
@@ -61,6 +62,7 @@ static inline void hand_begin(hand_plan *h, uint32_t ring_size) {
     h->plan.tree = h->tree;
     h->plan.weights = h->weights;
     h->plan.constants = h->constants;
+    h->plan.point_scales = h->scales;
     for (uint32_t i = 3; i < 3 * ring_size; ++i) h->positions[i] = (double)(float)hand_random();
 }
 
@@ -89,7 +91,12 @@ static inline int hand_eval(qp_device *device, const hand_plan *h, qp_precision 
                             int no_regular_pass, uint64_t count, const uint32_t *patch, const double *uv,
                             qp_frame **frame, qp_stream *stream) {
     qp_error err = {0};
-    qp_frame_options options = {.precision = precision, .want_hash = 1, .no_regular_pass = no_regular_pass};
+    /* Deeper plans and owners of edges could not be made: there is no mesh. */
+    qp_frame_options options = {.precision = precision,
+                                .want_hash = 1,
+                                .no_regular_pass = no_regular_pass,
+                                .no_sharing = 1,
+                                .no_exact_tail = 1};
     return CHECK_OK(qp_frame_create(device, &h->surface, &options, frame, &err), err) &&
            CHECK_OK(qp_frame_eval_points(*frame, count, patch, uv, stream, &err), err);
 }

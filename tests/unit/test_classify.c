@@ -1,5 +1,6 @@
 /* Which node of a hand-made plan evaluates a point. */
 #include "host/frame/classify.h"
+#include "host/frame/frame.h"
 #include "tests/check.h"
 
 enum {
@@ -36,7 +37,8 @@ static uint32_t tree[80] = {
 
 static void expect(float u, float v, uint32_t kind, uint32_t level) {
     qp_plan plan = {.tree = tree, .tree_words = 80};
-    qp_leaf leaf = qp_classify(&plan, u, v);
+    qp_leaf leaf = qp_classify(&plan, qp_signed_coordinate((double)u, QP_DOUBLE),
+                               qp_signed_coordinate((double)v, QP_DOUBLE));
     if (!CHECK(leaf.kind == kind && leaf.level == level))
         fprintf(stderr, "    (%g, %g): kind %u, level %u\n", (double)u, (double)v, leaf.kind, leaf.level);
 }
@@ -58,13 +60,13 @@ int main(void) {
     expect(0.49f, 0.90f, QP_NODE_EXTRAORDINARY, 4);
 
     for (uint32_t r = 0; r < 4; r++) {
-        float u = 0.25f, v = 0.625f;
+        double u = 0.25, v = -0.375; /* 5/8 */
         qp_rotate_uv(r, &u, &v);
         qp_rotate_uv(4 - r, &u, &v);
-        CHECK(u == 0.25f && v == 0.625f);
+        CHECK(u == 0.25 && v == -0.375);
     }
-    float u = 0.25f, v = 0.0f; /* one turn puts corner (0,0) of the plan at corner (1,0) of the patch */
+    double u = 0.25, v = 0.0; /* one turn puts corner (0,0) of the plan at corner (1,0) of the patch */
     qp_rotate_uv(1, &u, &v);
-    CHECK(u == 0.0f && v == 0.75f);
+    CHECK(u == 0.0 && v == -0.25);
     return check_report();
 }

@@ -66,6 +66,8 @@ static void unrotate(uint32_t r, wide a, wide b, wide *u, wide *v) {
     *v = r == 0 ? b : r == 1 ? a : r == 2 ? 1 - b : 1 - a;
 }
 
+static uint32_t tail_word;
+
 /* A terminal over [x, x + size]^2 with its corner where rotation r puts it, and an extraordinary leaf below. The
  * first `absolute` rings are not relative to the corner. */
 static void terminal(wide x, wide y, wide size, uint32_t r, uint32_t rings, uint32_t absolute) {
@@ -86,6 +88,7 @@ static void terminal(wide x, wide y, wide size, uint32_t r, uint32_t rings, uint
                 unrotate(r, (i - 1) * step, (j - 1) * step, &u, &v);
                 indices[n++] =
                     control_point(x + size * u, y + size * v, size * step, k < absolute ? NULL : corner);
+                plan.scales[indices[n - 1]] = k < absolute ? 0 : (uint8_t)k;
             }
         }
         hand_indices(&plan, indices, 24);
@@ -95,6 +98,9 @@ static void terminal(wide x, wide y, wide size, uint32_t r, uint32_t rings, uint
     hand_word(&plan, origin);
     hand_word(&plan, du);
     hand_word(&plan, dv);
+    hand_word(&plan, 0); /* offset of the ratio, once all points are known */
+    tail_word = plan.plan.tree_words - 1;
+    plan.constants[plan.plan.constant_count++] = 0.5;
 }
 
 static void irregular(wide x, wide y, wide size) {
@@ -250,6 +256,7 @@ static void test_tree(qp_device *host, qp_device *opencl, uint32_t rotation) {
     terminal(0, 0.5L, 0.5L, rotation, 5, rotation);
     plan.tree[4] = plan.plan.tree_words;
     irregular(0.5L, 0.5L, 0.5L);
+    plan.tree[tail_word] = plan.plan.point_count * plan.plan.ring_size;
     hand_end(&plan, QP_PLAN_INTERNAL | QP_PLAN_TERMINAL | QP_PLAN_CORNERS);
     scatter();
     /* The corners of the irregular leaf, in plan coordinates through patch 0, and the terminal's. */

@@ -1,0 +1,88 @@
+/* Plans as a device reads them (kernels/plan_layout.h). */
+#include "host/plan/plan.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Weights this much below their row's largest change nothing in float, and might be denormal numbers, which some devices flush. */
+static double smallest_weight(const double *row, uint32_t width) {
+    double largest = 0.0;
+    for (uint32_t j = 0; j < width; ++j) largest = fmax(largest, fabs(row[j]));
+    return largest * 0x1p-60;
+}
+
+static void pack_reals(const qp_plan *plan, qp_precision precision, void *reals, size_t at) {
+    uint32_t rows = plan->point_count, width = plan->ring_size;
+    for (uint32_t i = 0; i < rows; ++i) {
+        const double *row = plan->weights + (size_t)i * width, scale = ldexp(1.0, plan->point_scales[i]);
+        const double smallest = smallest_weight(row, width);
+        for (uint32_t j = 0; j < width; ++j) {
+            size_t to = at + (size_t)j * rows + i;
+            if (precision == QP_DOUBLE) {
+                ((double *)reals)[to] = row[j] * scale;
+            } else {
+                ((float *)reals)[to] = fabs(row[j]) < smallest ? 0.0f : (float)(row[j] * scale);
+            }
+        }
+    }
+    at += (size_t)rows * width;
+    for (uint32_t c = 0; c < plan->constant_count; ++c) {
+        if (precision == QP_DOUBLE) {
+            ((double *)reals)[at + c] = plan->constants[c];
+        } else {
+            ((float *)reals)[at + c] = (float)plan->constants[c];
+        }
+    }
+}
+
+static void pack_head(const qp_plan *plan, size_t tree, size_t reals, uint32_t *head) {
+    head[QP_HEAD_RING] = plan->ring_size;
+    head[QP_HEAD_POINTS] = plan->point_count;
+    head[QP_HEAD_TREE] = (uint32_t)tree;
+    head[QP_HEAD_REALS] = (uint32_t)reals;
+    head[QP_HEAD_FLAGS] = plan->flags;
+    memcpy(head + QP_HEAD_ROWS, plan->rows, sizeof plan->rows);
+}
+
+qp_status qp_surface_pack(const qp_surface *const *surfaces, uint32_t n_surfaces, qp_precision precision,
+                          qp_plan_pack *pack, qp_error *err) {
+    *pack = (qp_plan_pack){0};
+    for (uint32_t s = 0; s < n_surfaces; ++s) {
+        pack->head_words += (size_t)surfaces[s]->n_plans * QP_HEAD_WORDS;
+        for (uint32_t p = 0; p < surfaces[s]->n_plans; ++p) {
+            const qp_plan *plan = surfaces[s]->plans[p];
+            pack->tree_words += plan->tree_words;
+            pack->real_count += (size_t)plan->point_count * plan->ring_size + plan->constant_count;
+        }
+    }
+    if (pack->tree_words > UINT32_MAX || pack->real_count > UINT32_MAX) {
+        return qp_fail(err, QP_SYSTEM,
+                       "the plans of this surface hold more than 2^32 words; lower the depth");
+    }
+    size_t real_size = precision == QP_DOUBLE ? sizeof(double) : sizeof(float);
+    pack->heads = qp_alloc(pack->head_words, sizeof(uint32_t), true);
+    pack->tree = qp_alloc(pack->tree_words, sizeof(uint32_t), false);
+    pack->reals = qp_alloc(pack->real_count, real_size, false);
+    if (pack->heads == NULL || pack->tree == NULL || pack->reals == NULL) {
+        free(pack->heads);
+        free(pack->tree);
+        free(pack->reals);
+        size_t bytes = pack->real_count * real_size;
+        *pack = (qp_plan_pack){0};
+        return qp_fail_memory(err, bytes, "packed plans");
+    }
+    size_t tree = 0, reals = 0;
+    uint32_t *head = pack->heads;
+    for (uint32_t s = 0; s < n_surfaces; ++s) {
+        for (uint32_t p = 0; p < surfaces[s]->n_plans; ++p, head += QP_HEAD_WORDS) {
+            const qp_plan *plan = surfaces[s]->plans[p];
+            pack_head(plan, tree, reals, head);
+            memcpy(pack->tree + tree, plan->tree, plan->tree_words * sizeof *plan->tree);
+            pack_reals(plan, precision, pack->reals, reals);
+            tree += plan->tree_words;
+            reals += (size_t)plan->point_count * plan->ring_size + plan->constant_count;
+        }
+    }
+    return QP_OK;
+}
