@@ -11,8 +11,10 @@ typedef struct cli_command {
     qp_status (*run)(int argc, char **argv, qp_error *err); /* argv[0] is the subcommand's name */
 } cli_command;
 
-extern const cli_command cli_info, cli_gen, cli_eval, cli_error, cli_sample, cli_stress, cli_render,
-    cli_devices;
+extern const cli_command cli_watertight, cli_info, cli_gen, cli_eval, cli_error, cli_sample, cli_stress,
+    cli_render, cli_devices, cli_bench;
+/* Of `bench`; its name is "bench NAME". */
+extern const cli_command cli_error_time;
 
 /* ---- Options (options.c) ---- */
 typedef enum cli_kind {

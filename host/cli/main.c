@@ -4,8 +4,10 @@
 #include <errno.h>
 #include <string.h>
 
-static const cli_command *const commands[] = {&cli_info,   &cli_gen,    &cli_eval,   &cli_error,
-                                              &cli_sample, &cli_stress, &cli_render, &cli_devices};
+static const cli_command *const commands[] = {&cli_info,   &cli_gen,        &cli_eval,
+                                              &cli_error,  &cli_watertight, &cli_sample,
+                                              &cli_stress, &cli_render,     &cli_devices,
+                                              &cli_bench};
 enum { N_COMMANDS = sizeof commands / sizeof commands[0] };
 
 static void usage(FILE *file) {
@@ -13,7 +15,7 @@ static void usage(FILE *file) {
           "Exact evaluation of Catmull-Clark subdivision surfaces by adaptive quadtrees.\n\n",
           file);
     for (int i = 0; i < N_COMMANDS; ++i)
-        fprintf(file, "  %-8s %s\n", commands[i]->name, commands[i]->summary);
+        fprintf(file, "  %-10s %s\n", commands[i]->name, commands[i]->summary);
     fputs("\n`quadplan SUBCOMMAND --help` explains each; `quadplan --version` prints the version.\n"
           "Exit: 0 good, 1 a check failed, 2 wrong usage or input, 3 device or system.\n",
           file);

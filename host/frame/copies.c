@@ -36,26 +36,19 @@ static qp_ghost ghost_at_corner(qp_side side) {
     return ghost_on_edge(side, 0.0); /* edge k starts at corner k */
 }
 
-/* ---- What is found goes to a list, or is counted first ---- */
+/* ---- What is found goes to a list ---- */
 
+/* The copies and ghosts of some faces. Sources that are ghosts are numbered from QP_SHARE_GHOST on in each sink. */
 typedef struct sink {
-    qp_copy *copies;  /* NULL: count only */
-    qp_ghost *ghosts; /* likewise */
-    size_t n_copies, n_ghosts;
-    qp_copy open; /* the run at hand; count 0: none */
+    qp_copies copies;
+    qp_ghosts ghosts;
+    bool failed; /* memory is out */
 } sink;
 
-static void close_run(sink *s) {
-    if (s->open.count == 0) return;
-    if (s->copies != NULL) s->copies[s->n_copies] = s->open;
-    ++s->n_copies;
-    s->open.count = 0;
-}
-
 static void add_copy(sink *s, uint64_t to, uint64_t from, uint8_t fields) {
-    qp_copy *run = &s->open;
+    qp_copy *run = s->copies.count != 0 ? &s->copies.list[s->copies.count - 1] : NULL;
     /* Copies from ghosts stay single: their places are not known yet. */
-    if (run->count != 0 && run->fields == fields && to == run->to + run->count && from < QP_SHARE_GHOST) {
+    if (run != NULL && run->fields == fields && to == run->to + run->count && from < QP_SHARE_GHOST) {
         if (run->count == 1 && (from == run->from + 1 || from + 1 == run->from)) {
             run->step = from > run->from ? 1 : -1;
             run->count = 2;
@@ -66,26 +59,35 @@ static void add_copy(sink *s, uint64_t to, uint64_t from, uint8_t fields) {
             return;
         }
     }
-    close_run(s);
-    *run = (qp_copy){.to = to, .from = from, .count = 1, .step = 1, .fields = fields};
+    if (!qp_grow((void **)&s->copies.list, &s->copies.capacity, s->copies.count + 1,
+                 sizeof *s->copies.list)) {
+        s->failed = true;
+        return;
+    }
+    s->copies.list[s->copies.count++] =
+        (qp_copy){.to = to, .from = from, .count = 1, .step = 1, .fields = fields};
 }
 
-/* Number of a new ghost, as a source; in the list, ghosts of this sink begin at `first`. */
-static uint64_t add_ghost(sink *s, size_t first, qp_ghost ghost) {
-    if (s->ghosts != NULL) s->ghosts[s->n_ghosts] = ghost;
-    return QP_SHARE_GHOST + first + s->n_ghosts++;
+/* Number of a new ghost, as a source. */
+static uint64_t add_ghost(sink *s, qp_ghost ghost) {
+    if (!qp_grow((void **)&s->ghosts.list, &s->ghosts.capacity, s->ghosts.count + 1,
+                 sizeof *s->ghosts.list)) {
+        s->failed = true;
+        return QP_SHARE_GHOST;
+    }
+    s->ghosts.list[s->ghosts.count] = ghost;
+    return QP_SHARE_GHOST + s->ghosts.count++;
 }
 
 /* ---- Tessellations ---- */
+
+enum { BLOCK = 256 }; /* faces a sink */
 
 typedef struct share_job {
     const qp_share *share;
     const uint64_t *first_part;
     const qp_share_part *parts;
-    /* [n_faces + 1]: counted by face, then summed up to what lies before each. */
-    size_t *first_copy, *first_ghost;
-    qp_copy *copies; /* NULL while counting */
-    qp_ghost *ghosts;
+    sink *sinks; /* one a block of faces */
 } share_job;
 
 /* Samples along one edge of a patch, in its direction; both ends included, and the middle twice when the patch is quartered. */
@@ -135,8 +137,7 @@ static bool find_sample(const run *r, float t, uint32_t *near, uint64_t *sample)
     return at == t;
 }
 
-static void share_edge(const share_job *job, sink *s, size_t first_ghost, qp_side side,
-                       const qp_edge_owner *owner) {
+static void share_edge(const share_job *job, sink *s, qp_side side, const qp_edge_owner *owner) {
     const run mine = open_run(job, side);
     const uint32_t count = mine.count[0] + mine.count[1];
     run theirs[2];
@@ -155,7 +156,7 @@ static void share_edge(const share_job *job, sink *s, size_t first_ghost, qp_sid
         }
         uint64_t from;
         if (!find_sample(&theirs[half], t, &near[half], &from))
-            from = add_ghost(s, first_ghost, ghost_on_edge(owner->side[half], signed_of((double)t)));
+            from = add_ghost(s, ghost_on_edge(owner->side[half], signed_of((double)t)));
         add_copy(s, to, from, fields);
     }
 }
@@ -169,16 +170,14 @@ static bool corner_sample(const share_job *job, qp_side side, uint64_t *sample) 
     return true;
 }
 
-static void share_corner(const share_job *job, sink *s, size_t first_ghost, qp_side side,
-                         const qp_corner_owner *owner) {
+static void share_corner(const share_job *job, sink *s, qp_side side, const qp_corner_owner *owner) {
     const qp_side from[2] = {owner->position, owner->normal};
     const bool both = from[0].patch == from[1].patch;
     uint64_t to, source;
     if (!corner_sample(job, side, &to)) return;
     for (int i = 0; i < (both ? 1 : 2); ++i) {
         if (from[i].patch == QP_NONE || from[i].patch == side.patch) continue;
-        if (!corner_sample(job, from[i], &source))
-            source = add_ghost(s, first_ghost, ghost_at_corner(from[i]));
+        if (!corner_sample(job, from[i], &source)) source = add_ghost(s, ghost_at_corner(from[i]));
         add_copy(s, to, source,
                  (uint8_t)(both     ? QP_SHARE_POSITION | QP_SHARE_NORMAL
                            : i == 0 ? QP_SHARE_POSITION
@@ -186,74 +185,76 @@ static void share_corner(const share_job *job, sink *s, size_t first_ghost, qp_s
     }
 }
 
-static void share_faces(void *context, size_t begin, size_t end, unsigned worker) {
-    share_job *job = context;
+static void share_face(const share_job *job, uint32_t face, sink *s) {
     const qp_mesh *mesh = job->share->surface->mesh;
+    const uint32_t first = mesh->patch_offsets[face];
+    for (uint32_t p = first; p < mesh->patch_offsets[face + 1]; ++p) {
+        if (job->first_part[p] == job->first_part[p + 1]) continue;
+        for (uint32_t k = 0; k < 4; ++k) {
+            const qp_side side = {p, k};
+            const qp_corner_owner corner = qp_share_corner(job->share, face, p - first, k);
+            share_corner(job, s, side, &corner);
+            const qp_edge_owner edge = qp_share_edge(job->share, face, p - first, k);
+            if (!edge.own) share_edge(job, s, side, &edge);
+        }
+    }
+}
+
+static void share_blocks(void *context, size_t begin, size_t end, unsigned worker) {
+    const share_job *job = context;
+    const uint32_t n_faces = job->share->surface->mesh->n_faces;
     (void)worker;
-    for (size_t f = begin; f < end; ++f) {
-        const uint32_t face = (uint32_t)f, first = mesh->patch_offsets[face];
-        sink s = {0};
-        size_t first_ghost = 0;
-        if (job->copies != NULL) {
-            s.copies = job->copies + job->first_copy[f];
-            s.ghosts = job->ghosts + job->first_ghost[f];
-            first_ghost = job->first_ghost[f];
-        }
-        for (uint32_t p = first; p < mesh->patch_offsets[face + 1]; ++p) {
-            if (job->first_part[p] == job->first_part[p + 1]) continue;
-            for (uint32_t k = 0; k < 4; ++k) {
-                const qp_side side = {p, k};
-                const qp_corner_owner corner = qp_share_corner(job->share, face, p - first, k);
-                share_corner(job, &s, first_ghost, side, &corner);
-                const qp_edge_owner edge = qp_share_edge(job->share, face, p - first, k);
-                if (!edge.own) share_edge(job, &s, first_ghost, side, &edge);
-            }
-        }
-        close_run(&s);
-        if (job->copies != NULL) continue;
-        job->first_copy[f] = s.n_copies;
-        job->first_ghost[f] = s.n_ghosts;
+    for (size_t b = begin; b < end; ++b) {
+        const uint32_t first = (uint32_t)b * BLOCK, count = n_faces - first < BLOCK ? n_faces - first : BLOCK;
+        for (uint32_t i = 0; i < count; ++i) share_face(job, first + i, &job->sinks[b]);
     }
 }
 
-/* Makes each count the sum of those before it; returns the sum of all. */
-static size_t sum_up(size_t *counts, uint32_t n) {
-    size_t sum = 0;
-    for (uint32_t i = 0; i < n; ++i) {
-        const size_t count = counts[i];
-        counts[i] = sum;
-        sum += count;
+/* Joins the sinks, ghosts numbered anew. */
+static qp_status join_sinks(const sink *sinks, size_t n_sinks, qp_copies *copies, qp_ghosts *ghosts,
+                            qp_error *err) {
+    bool failed = false;
+    for (size_t b = 0; b < n_sinks; ++b) {
+        copies->capacity += sinks[b].copies.count;
+        ghosts->capacity += sinks[b].ghosts.count;
+        failed = failed || sinks[b].failed;
     }
-    return sum;
-}
-
-qp_status qp_share_tessellation(const qp_share *share, const uint64_t *first_part, const qp_share_part *parts,
-                                qp_copies *copies, qp_ghosts *ghosts, qp_error *err) {
-    const uint32_t n_faces = share->surface->mesh->n_faces;
-    share_job job = {.share = share, .first_part = first_part, .parts = parts};
-    *copies = (qp_copies){0};
-    *ghosts = (qp_ghosts){0};
-    job.first_copy = qp_alloc(n_faces, sizeof *job.first_copy, true);
-    job.first_ghost = qp_alloc(n_faces, sizeof *job.first_ghost, true);
-    qp_status status = QP_OK;
-    if (job.first_copy != NULL && job.first_ghost != NULL) {
-        qp_parallel(n_faces, 64, share_faces, &job);
-        copies->count = copies->capacity = sum_up(job.first_copy, n_faces);
-        ghosts->count = ghosts->capacity = sum_up(job.first_ghost, n_faces);
-        job.copies = copies->list = qp_alloc(copies->count, sizeof *copies->list, false);
-        job.ghosts = ghosts->list = qp_alloc(ghosts->count, sizeof *ghosts->list, false);
-    }
-    if (job.copies == NULL || job.ghosts == NULL) {
-        status = qp_fail_memory(err, copies->count * sizeof *copies->list, "shared samples");
+    copies->list = qp_alloc(copies->capacity, sizeof *copies->list, false);
+    ghosts->list = qp_alloc(ghosts->capacity, sizeof *ghosts->list, false);
+    if (failed || copies->list == NULL || ghosts->list == NULL) {
+        const size_t bytes = copies->capacity * sizeof *copies->list;
         free(copies->list);
         free(ghosts->list);
         *copies = (qp_copies){0};
         *ghosts = (qp_ghosts){0};
-    } else {
-        qp_parallel(n_faces, 64, share_faces, &job);
+        return qp_fail_memory(err, bytes, "shared samples");
     }
-    free(job.first_copy);
-    free(job.first_ghost);
+    for (size_t b = 0; b < n_sinks; ++b) {
+        for (size_t i = 0; i < sinks[b].copies.count; ++i) {
+            qp_copy copy = sinks[b].copies.list[i];
+            if (copy.from >= QP_SHARE_GHOST) copy.from += ghosts->count;
+            copies->list[copies->count++] = copy;
+        }
+        for (size_t i = 0; i < sinks[b].ghosts.count; ++i)
+            ghosts->list[ghosts->count++] = sinks[b].ghosts.list[i];
+    }
+    return QP_OK;
+}
+
+qp_status qp_share_tessellation(const qp_share *share, const uint64_t *first_part, const qp_share_part *parts,
+                                qp_copies *copies, qp_ghosts *ghosts, qp_error *err) {
+    const size_t n_sinks = ((size_t)share->surface->mesh->n_faces + BLOCK - 1) / BLOCK;
+    share_job job = {share, first_part, parts, qp_alloc(n_sinks, sizeof *job.sinks, true)};
+    *copies = (qp_copies){0};
+    *ghosts = (qp_ghosts){0};
+    if (job.sinks == NULL) return qp_fail_memory(err, n_sinks * sizeof *job.sinks, "shared samples");
+    qp_parallel(n_sinks, 1, share_blocks, &job);
+    qp_status status = join_sinks(job.sinks, n_sinks, copies, ghosts, err);
+    for (size_t b = 0; b < n_sinks; ++b) {
+        free(job.sinks[b].copies.list);
+        free(job.sinks[b].ghosts.list);
+    }
+    free(job.sinks);
     return status;
 }
 
@@ -311,25 +312,47 @@ typedef struct copy_job {
     uint8_t *flags;
 } copy_job;
 
+/* The `bytes` from `skip` on of the samples of one run; inlined with constants, so that each move is a few instructions. */
+static inline void copy_run(const qp_copy *c, char *vertices, size_t stride, size_t skip, size_t bytes) {
+    char *to = vertices + c->to * stride + skip;
+    const char *from = vertices + c->from * stride + skip;
+    const ptrdiff_t step = c->step * (ptrdiff_t)stride;
+    for (uint32_t k = 0; k < c->count; ++k, to += stride, from += step) memcpy(to, from, bytes);
+}
+
+static inline void copy_reals(const qp_copy *c, char *vertices, size_t real_size) {
+    const size_t half = 3 * real_size;
+    switch (c->fields & (QP_SHARE_POSITION | QP_SHARE_NORMAL)) {
+    case QP_SHARE_POSITION:
+        copy_run(c, vertices, 2 * half, 0, half);
+        break;
+    case QP_SHARE_NORMAL:
+        copy_run(c, vertices, 2 * half, half, half);
+        break;
+    default:
+        copy_run(c, vertices, 2 * half, 0, 2 * half);
+    }
+}
+
+static void copy_flags(const qp_copy *c, uint8_t *flags) {
+    const uint8_t *from = flags + c->from;
+    uint8_t *to = flags + c->to;
+    if ((c->fields & (QP_SHARE_NORMAL | QP_SHARE_DEPTH)) == 0) return;
+    const uint8_t keep = c->fields & QP_SHARE_NORMAL ? QP_SAMPLE_LIMIT_FRAME : 0xff;
+    const uint8_t take = c->fields & QP_SHARE_NORMAL ? (uint8_t)~QP_SAMPLE_LIMIT_FRAME : QP_SAMPLE_PAST_DEPTH;
+    for (uint32_t k = 0; k < c->count; ++k, ++to, from += c->step)
+        *to = (uint8_t)((*to & keep) | (*from & take));
+}
+
 static void copy_some(void *context, size_t begin, size_t end, unsigned worker) {
     const copy_job *job = context;
-    const size_t half = 3 * job->real_size;
     (void)worker;
     for (size_t i = begin; i < end; ++i) {
-        const qp_copy *c = &job->list[i];
-        const bool position = (c->fields & QP_SHARE_POSITION) != 0,
-                   normal = (c->fields & QP_SHARE_NORMAL) != 0;
-        const uint64_t first = c->step > 0 ? c->from : c->from - (c->count - 1);
-        const size_t skip = position ? 0 : half, bytes = position && normal ? 2 * half : half;
-        for (uint32_t k = 0; k < c->count; ++k) {
-            const uint64_t to = c->to + k, from = first + (c->step > 0 ? k : c->count - 1 - k);
-            memcpy(job->vertices + to * 2 * half + skip, job->vertices + from * 2 * half + skip, bytes);
-            if (normal)
-                job->flags[to] = (uint8_t)((job->flags[to] & QP_SAMPLE_LIMIT_FRAME) |
-                                           (job->flags[from] & ~QP_SAMPLE_LIMIT_FRAME));
-            else if (c->fields & QP_SHARE_DEPTH)
-                job->flags[to] |= job->flags[from] & QP_SAMPLE_PAST_DEPTH;
-        }
+        if (job->real_size == sizeof(float))
+            copy_reals(&job->list[i], job->vertices, sizeof(float));
+        else
+            copy_reals(&job->list[i], job->vertices, sizeof(double));
+        copy_flags(&job->list[i], job->flags);
     }
 }
 

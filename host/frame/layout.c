@@ -79,8 +79,7 @@ static qp_rim find_rim(const qp_tess_grid *grid) {
 /* From a quarter's (u,v) to its patch's; exact, for the tessellator's points are multiples of 2^-16. */
 static void place_quarter(qp_tess_grid *grid, unsigned quarter) {
     const float add[2] = {(float)(quarter & 1u), (float)(quarter >> 1)};
-    for (size_t i = 0; i < 2 * (size_t)grid->n_points; ++i)
-        grid->uv[i] = 0.5f * (grid->uv[i] + add[i & 1u]);
+    for (size_t i = 0; i < 2 * (size_t)grid->n_points; ++i) grid->uv[i] = 0.5f * (grid->uv[i] + add[i & 1u]);
 }
 
 static void make_grids(void *context, size_t begin, size_t end, unsigned worker) {
@@ -104,7 +103,8 @@ static qp_status assign_grids(uint32_t n_patches, const qp_part_factors *factors
                               uint32_t **part_grid, qp_error *err) {
     const uint64_t n_parts = factors->first[n_patches];
     *part_grid = qp_alloc((size_t)n_parts, sizeof **part_grid, false);
-    if (*part_grid == NULL) return qp_fail_memory(err, (size_t)n_parts * sizeof **part_grid, "grids of patches");
+    if (*part_grid == NULL)
+        return qp_fail_memory(err, (size_t)n_parts * sizeof **part_grid, "grids of patches");
     for (uint32_t p = 0; p < n_patches; ++p) {
         const uint64_t first = factors->first[p], end = factors->first[p + 1];
         for (uint64_t i = first; i < end; ++i) {
@@ -293,7 +293,8 @@ qp_status qp_layout_tessellate(const qp_surface *surface, const qp_tessellation 
     *layout = (qp_frame_layout){0};
     tessellation t = {.surface = surface, .share = share};
     qp_status status = qp_factors_make(surface, tess, &t.factors, err);
-    if (status == QP_OK) status = assign_grids(surface->mesh->n_patches, &t.factors, &t.table, &t.part_grid, err);
+    if (status == QP_OK)
+        status = assign_grids(surface->mesh->n_patches, &t.factors, &t.table, &t.part_grid, err);
     if (status == QP_OK) {
         t.grids = qp_alloc(t.table.count, sizeof *t.grids, true);
         t.rims = qp_alloc(t.table.count, sizeof *t.rims, false);
