@@ -12,6 +12,8 @@ typedef struct stress_worker {
     qp_reference_work work;
     double *uv;
     size_t uv_capacity;
+    double
+        *positions; /* of the whole mesh; those about the patch at hand are a unit in the last place away */
     qp_reference_sample *samples, *moved;
     size_t sample_capacity, moved_capacity;
     qp_error error;
@@ -21,7 +23,7 @@ typedef struct stress {
     const qp_stress_case *tried;
     uint32_t number;
     const qp_stream *stream;
-    double *moved;           /* positions, a unit in the last place away */
+    qp_local_frame frame;
     uint64_t *first, *order; /* samples of patch p: order[first[p] .. first[p + 1]) */
     qp_stress_sample *results;
     bool *well; /* conditioned, of a normal that is worth asking about */
@@ -35,18 +37,49 @@ static double unit_in_last_place(double x, qp_precision precision) {
     return ldexp(1, power > least ? power : least);
 }
 
-/* Largest absolute coordinate, an axis at a time, over the faces that touch the patch's base face. */
-static void ring_size(const qp_mesh *m, uint32_t patch, double most[3]) {
+/* Calls visit with every corner of the faces that touch the patch's base face: each vertex of its 1-ring at least once. */
+static void visit_ring(const qp_mesh *m, uint32_t patch, void (*visit)(void *context, uint32_t vertex),
+                       void *context) {
     const uint32_t face = qp_patch_face(m, patch, NULL);
-    most[0] = most[1] = most[2] = 0;
     for (uint32_t c = m->face_offsets[face]; c < m->face_offsets[face + 1]; ++c) {
         const uint32_t v = m->face_vertices[c];
         for (uint32_t i = m->vertex_offsets[v]; i < m->vertex_offsets[v + 1]; ++i) {
             const uint32_t f = m->corner_face[m->vertex_corners[i]];
             for (uint32_t h = m->face_offsets[f]; h < m->face_offsets[f + 1]; ++h)
-                for (size_t k = 0; k < 3; ++k)
-                    most[k] = fmax(most[k], fabs(m->positions[3 * (size_t)m->face_vertices[h] + k]));
+                visit(context, m->face_vertices[h]);
         }
+    }
+}
+
+/* Largest absolute coordinates of a 1-ring, an axis at a time, and of what the device holds of them. */
+typedef struct ring_size {
+    const qp_mesh *mesh;
+    const qp_local_frame *frame;
+    double most[3], held[3];
+} ring_size;
+
+static void measure_vertex(void *context, uint32_t vertex) {
+    ring_size *ring = context;
+    for (size_t k = 0; k < 3; ++k) {
+        const double x = ring->mesh->positions[3 * (size_t)vertex + k];
+        ring->most[k] = fmax(ring->most[k], fabs(x));
+        ring->held[k] = fmax(ring->held[k], fabs(x - ring->frame->centre[k]));
+    }
+}
+
+/* A vertex moved by a unit in the last place of the largest coordinate of the ring. */
+typedef struct ring_move {
+    const qp_mesh *mesh;
+    double *positions, unit[3];
+} ring_move;
+
+static void move_vertex(void *context, uint32_t vertex) {
+    const ring_move *move = context;
+    qp_random random = {vertex}; /* the same however often the vertex comes */
+    for (size_t k = 0; k < 3; ++k) {
+        const size_t i = 3 * (size_t)vertex + k;
+        const double x = move->mesh->positions[i], unit = move->unit[k];
+        move->positions[i] = qp_random_chance(&random, 0.5) ? x + unit : x - unit;
     }
 }
 
@@ -104,12 +137,12 @@ static qp_status stress_patch(const stress *s, uint32_t patch, stress_worker *w)
     qp_status status =
         qp_reference_eval_with(&w->work, mesh, mesh->positions, patch, count, w->uv, w->samples, &w->error);
     if (status != QP_OK) return status;
-    double most[3];
+    ring_size ring = {.mesh = mesh, .frame = &s->frame};
     uint64_t asked = 0;
-    ring_size(mesh, patch, most);
+    visit_ring(mesh, patch, measure_vertex, &ring);
     for (uint64_t i = 0; i < count; ++i) {
         const qp_stress_sample *r = &s->results[order[i]];
-        measure_sample(s, order[i], most, &w->samples[i]);
+        measure_sample(s, order[i], ring.most, &w->samples[i]);
         if (!r->finite || w->samples[i].sine < 0.01) continue;
         s->well[order[i]] = r->normal_deg <= normal_limit(s->stream->precision);
         if (s->well[order[i]]) continue;
@@ -117,7 +150,14 @@ static qp_status stress_patch(const stress *s, uint32_t patch, stress_worker *w)
         ++asked;
     }
     if (asked == 0) return QP_OK;
-    status = qp_reference_eval_with(&w->work, mesh, s->moved, patch, asked, w->uv, w->moved, &w->error);
+    if (w->positions == NULL) {
+        w->positions = qp_alloc(mesh->n_vertices, 3 * sizeof(double), true);
+        if (w->positions == NULL) return qp_fail_memory(&w->error, mesh->n_vertices * 24u, "positions");
+    }
+    ring_move move = {.mesh = mesh, .positions = w->positions};
+    for (int k = 0; k < 3; ++k) move.unit[k] = unit_in_last_place(ring.held[k], s->stream->precision);
+    visit_ring(mesh, patch, move_vertex, &move);
+    status = qp_reference_eval_with(&w->work, mesh, w->positions, patch, asked, w->uv, w->moved, &w->error);
     if (status != QP_OK) return status;
     for (uint64_t i = 0, at = 0; i < count; ++i) {
         const qp_stress_sample *r = &s->results[order[i]];
@@ -147,15 +187,6 @@ static void sort_samples(stress *s) {
     s->first[0] = 0;
 }
 
-static void move_positions(const qp_mesh *mesh, qp_precision precision, double *moved) {
-    const qp_local_frame frame = qp_mesh_local_frame(mesh);
-    qp_random random = {1};
-    for (size_t i = 0; i < 3 * (size_t)mesh->n_vertices; ++i) {
-        const double x = mesh->positions[i], unit = unit_in_last_place(x - frame.centre[i % 3], precision);
-        moved[i] = qp_random_chance(&random, 0.5) ? x + unit : x - unit;
-    }
-}
-
 static void add_sample(qp_stress_report *report, const qp_stress_sample *r, bool well) {
     const bool flagged = r->flags & QP_SAMPLE_NO_NORMAL, past = r->flags & QP_SAMPLE_PAST_DEPTH;
     const bool defined = r->n[0] != 0 || r->n[1] != 0 || r->n[2] != 0;
@@ -165,7 +196,7 @@ static void add_sample(qp_stress_report *report, const qp_stress_sample *r, bool
         return;
     }
     const double *n = r->got + 3, length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-    report->normals_not_unit += flagged ? length != 0 : fabs(length - 1) > 1e-6;
+    report->normals_not_unit += fabs(length - 1) > 1e-6 && !(flagged && length == 0);
     report->no_normal += flagged;
     report->past_depth += past;
     if (past) return;
@@ -189,18 +220,17 @@ static qp_status compare(const qp_stress_case *tried, uint32_t number, const qp_
     stress s = {.tried = tried,
                 .number = number,
                 .stream = stream,
-                .moved = qp_alloc(mesh->n_vertices, 3 * sizeof(double), false),
+                .frame = qp_mesh_local_frame(mesh),
                 .first = qp_alloc((size_t)mesh->n_patches + 1, sizeof(uint64_t), true),
                 .order = qp_alloc(tried->count, sizeof(uint64_t), false),
                 .results = qp_alloc(tried->count, sizeof(qp_stress_sample), true),
                 .well = qp_alloc(tried->count, sizeof(bool), true),
                 .workers = qp_alloc(n_workers, sizeof(stress_worker), true)};
     qp_status status = QP_OK;
-    if (!s.moved || !s.first || !s.order || !s.results || !s.well || !s.workers)
+    if (!s.first || !s.order || !s.results || !s.well || !s.workers)
         status = qp_fail_memory(err, tried->count * sizeof(qp_stress_sample), "the samples of a case");
     if (status == QP_OK) {
         sort_samples(&s);
-        move_positions(mesh, stream->precision, s.moved);
         qp_parallel(mesh->n_patches, 1, stress_range, &s);
     }
     for (unsigned w = 0; w < n_workers && s.workers; ++w) {
@@ -210,12 +240,12 @@ static qp_status compare(const qp_stress_case *tried, uint32_t number, const qp_
         free(s.workers[w].uv);
         free(s.workers[w].samples);
         free(s.workers[w].moved);
+        free(s.workers[w].positions);
     }
     for (uint64_t i = 0; i < tried->count && status == QP_OK; ++i) {
         add_sample(report, &s.results[i], s.well[i]);
         if (each != NULL) each(context, &s.results[i]);
     }
-    free(s.moved);
     free(s.first);
     free(s.order);
     free(s.results);

@@ -56,8 +56,8 @@ typedef struct qp_stress_sample {
  * on their way to the device (half a unit at the most) counts as an error of the evaluation.
  *
  * The normal of a sample is *well conditioned* where the reference has one, its tangents are not almost parallel (sine at least
- * 0.01), and it turns by no more than 1e-3 degrees (double: 1e-11) when every coordinate is moved by a unit in the last place of what
- * the device holds of it (qp_mesh_local_frame), up or down at random. */
+ * 0.01), and it turns by no more than 1e-3 degrees (double: 1e-11) when every coordinate of the 1-ring is moved up or down, at
+ * random, by a unit in the last place of the largest one on its axis, as the device holds them (qp_mesh_local_frame). */
 typedef struct qp_stress_report {
     uint64_t cases, samples;
     uint64_t nonfinite;       /* samples with a NaN or an infinity in position or normal */
@@ -65,7 +65,7 @@ typedef struct qp_stress_report {
     uint64_t no_normal;       /* flagged as without a normal */
     uint64_t normals_missing; /* of them, those whose normal is well conditioned */
     uint64_t
-        normals_not_unit; /* not flagged, but off 1 in length by more than 1e-6; or flagged, but not the fallback 0 */
+        normals_not_unit; /* off 1 in length by more than 1e-6, and not a flagged 0 */
     uint64_t normals_ill; /* neither measured nor flagged, as they are not well conditioned */
     double worst_ulp;
     double worst_normal_deg;              /* over the well-conditioned */
