@@ -1,6 +1,7 @@
 /* Terminal nodes: chains of cells with one irregular corner. */
 #include "host/plan/parts.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 /* Marks a ring's point as an offset from `origin`. A ring shrinks by about half a level, so ring number k is handed to a device
@@ -187,6 +188,23 @@ static qp_cell *move_cell(qp_local *tail, qp_level *to, const qp_level *from, co
     return moved;
 }
 
+/* The rounding errors of offsets hold a part that is the same for all points, and does not shrink as the offsets do (its eigenvalue
+ * is 1). It is what their own limit is not 0 by: takes it away again. */
+static bool recenter(qp_local *tail, qp_level *level, const qp_corner *corner, const double *mask) {
+    double *limit = qp_alloc(tail->width, sizeof *limit, false);
+    if (limit == NULL) return false;
+    qp_limit_apply(tail, level, corner->fan, mask, limit);
+    for (uint32_t i = 0; i < level->count; ++i) {
+        double *row = qp_level_row(tail, level, i);
+        for (uint32_t w = 0; w < tail->width; ++w) row[w] -= limit[w];
+    }
+    free(limit);
+    return true;
+}
+
+/* Levels in which rings shrink by 2^16 at the most (valence 2: 1/4 a level), so that what stays of the errors is small enough. */
+enum { RECENTER_LEVELS = 8 };
+
 /* The chain's rings from `level` + 1 to the plan's depth, as offsets from the final point `origin`. */
 static void add_tail_rings(qp_builder *b, uint32_t level, const qp_item *item, qp_chain *chain,
                            uint32_t origin) {
@@ -199,21 +217,27 @@ static void add_tail_rings(qp_builder *b, uint32_t level, const qp_item *item, q
     at.cell = move_cell(tail, from, &b->local.level[level & 1], item->cell, qp_plan_final_row(b, origin));
     chain->offset_ring = chain->rings;
     bool tie_u = qp_plan_corner_high_u(chain->corner), tie_v = qp_plan_corner_high_v(chain->corner);
-    for (; level - b->base < b->depth; ++level) {
+    double *mask = NULL;
+    bool good = at.cell != NULL;
+    for (uint32_t step = 1; good && level - b->base < b->depth; ++level, ++step) {
         qp_level *to = &tail->level[(level + 1) & 1];
         qp_level_clear(to);
-        qp_cell *children =
-            at.cell == NULL ? NULL : qp_refine_cell(tail, &tail->level[level & 1], to, at.cell);
-        if (children == NULL || tail->failed) {
-            b->failed = true;
-            return;
+        qp_cell *children = qp_refine_cell(tail, &tail->level[level & 1], to, at.cell);
+        good = children != NULL && !tail->failed;
+        if (good && step % RECENTER_LEVELS == 0) {
+            const qp_corner *corner = &children[chain->corner].corner[chain->corner];
+            if (mask == NULL) mask = qp_limit_mask(corner);
+            good = mask != NULL && recenter(tail, to, corner, mask);
         }
+        if (!good) break;
         uint32_t ring = chain->rings;
         add_ring(b, tail, level + 1, &at, children, chain);
-        if (b->failed || b->too_large) return;
+        if (b->failed || b->too_large) break;
         for (uint32_t k = 0; k < 24; ++k) make_offset(b, chain->points[ring][k], origin, ring);
         at = qp_plan_child_item(&at, children, chain->corner, tie_u, tie_v);
     }
+    free(mask);
+    b->failed = b->failed || !good;
 }
 
 /* How much a ring shrinks from one level to the next, once the modes that decay faster have vanished: the dominant eigenvalue of

@@ -200,6 +200,20 @@ static bool has_general_face(const qp_fan *fan) {
     return false;
 }
 
+double *qp_limit_mask(const qp_corner *corner) {
+    uint32_t count = 1 + qp_fan_spokes(corner->fan) + corner->fan->faces;
+    double *block = qp_alloc(4 * (size_t)count, sizeof *block, true);
+    if (block == NULL) return NULL;
+    masks m = {.p = block, .t1 = block + count, .t2 = block + 2 * (size_t)count};
+    fan_masks(corner, &m, block + 3 * (size_t)count);
+    return block;
+}
+
+void qp_limit_apply(const qp_local *local, const qp_level *level, const qp_fan *fan, const double *mask,
+                    double *row) {
+    apply_mask(local, level, fan, mask, row);
+}
+
 void qp_limit_stencils(qp_local *local, const qp_level *from, const qp_corner *corner, double *rows,
                        bool *has_tangents) {
     /* Semi-sharp features, and faces that are no quads, go away by subdividing the vertex's 1-ring on its

@@ -120,6 +120,13 @@ qp_fan *qp_refine_fan(qp_local *local, qp_level *from, qp_level *to, const qp_fa
 void qp_limit_stencils(qp_local *local, const qp_level *from, const qp_corner *corner, double *rows,
                        bool *has_tangents);
 
+/* Weights of the limit position over a fan's vertex, spokes and diagonals, for a fan of quads without semi-sharp features; malloced,
+ * NULL when memory is out. They hold for the vertex's fans at all further levels. */
+double *qp_limit_mask(const qp_corner *corner);
+/* row = the mask applied to the fan's points. */
+void qp_limit_apply(const qp_local *local, const qp_level *level, const qp_fan *fan, const double *mask,
+                    double *row);
+
 bool qp_sharp_is_semi(float s);
 bool qp_sharp_is_infinite(float s);
 /* After one subdivision, by the uniform rule. */
