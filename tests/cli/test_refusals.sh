@@ -85,4 +85,10 @@ check "write error: exit 3" [ "$(tail -n 1 "$work/limited")" -eq 3 ]
 check "write error: the old file is kept" cmp "$cube" "$work/kept.obj"
 rm "$work/limited"
 check "nothing half written" [ "$(find "$work" | sort)" = "$before" ]
+refuses "stress: no such family" 2 "'nothing' is none of" stress --family nothing
+refuses "stress: a case of no family" 2 "case needs --family" stress --case 1
+refuses "stress: half a sample" 2 "patch and --uv go together" stress --family far --case 1 --patch 0
+refuses "stress: no such patch" 2 "the case has [0-9]+ patches" stress --family far --case 1 --patch 999999 --uv 0,0 --device host
+refuses "stress: no point" 2 "not of the form U,V" stress --family far --case 1 --patch 0 --uv 0 --device host
+
 finish

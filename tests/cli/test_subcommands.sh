@@ -7,7 +7,7 @@ check "help" [ "$code" -eq 0 ]
 check "help names the subcommands" grep -q devices "$work/stdout"
 run --version
 check "version" grep -qE '^quadplan [0-9]+\.[0-9]+\.[0-9]+$' "$work/stdout"
-for subcommand in info gen eval error render devices; do
+for subcommand in info gen eval error stress render devices; do
     run "$subcommand" --help
     check "$subcommand --help" [ "$code" -eq 0 ]
     check "$subcommand --help names --json" grep -q -- --json "$work/stdout"
@@ -49,6 +49,26 @@ check "host and device: the same bits" python3 -c '
 import json, sys
 a, b = (json.load(open(f))["stream_hash"] for f in sys.argv[1:])
 sys.exit(a != b)' "$work/eval.json" "$work/evalhost.json"
+
+run stress --list
+check "stress --list" grep -q '^far-scaled .*24 cases' "$work/stdout"
+run stress --device host --family far-scaled --cases 3 --samples 20 --json
+check "stress" [ "$code" -eq 0 ]
+keys stress families precision device seed
+value 'len(o["families"]) == 1 and o["families"][0]["name"] == "far-scaled" and o["families"][0]["cases"] == 3'
+value 'o["families"][0]["samples"] == 60 and o["families"][0]["nonfinite"] == 0'
+value '0 < o["families"][0]["worst_ulp"] <= 8'
+cp "$work/stdout" "$work/stress.json"
+again=$(python3 -c 'import json, sys; print(json.load(open(sys.argv[1]))["families"][0]["command"])' "$work/stress.json")
+check "stress prints its command" [ "${again#quadplan stress --family far-scaled --case }" != "$again" ]
+eval "run ${again#quadplan } --json"
+check "stress: the command of the worst sample" [ "$code" -eq 0 ]
+check "stress: which errs as much" python3 -c '
+import json, sys
+a, b = (json.load(open(f))["families"][0]["worst_ulp"] for f in sys.argv[1:])
+sys.exit(a != b)' "$work/stress.json" "$work/stdout"
+run stress --device host --family needles --case 1 --write "$work/needles.obj"
+check "stress --write" [ -s "$work/needles.obj" ]
 
 run eval "$cube" --tess 4 --device host -o "$work/out.obj"
 check "eval -o obj" [ "$(grep -c '^v ' "$work/out.obj")" -eq 150 ]
