@@ -12,5 +12,6 @@ typedef struct qp_embedded {
 
 extern const qp_embedded qp_embedded_kernels[]; /* kernels/ *.cl and *.h; in libquadplan */
 extern const qp_embedded qp_embedded_shaders[]; /* gl/shaders/ *.glsl; in the program */
+extern const qp_embedded qp_embedded_scripts[]; /* bench/ *.py; in the program */
 
 #endif

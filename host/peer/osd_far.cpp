@@ -177,8 +177,8 @@ template <typename EVALUATOR> bool evaluate_float(Evaluator *e) {
 void update_double(void *context, uint64_t begin, uint64_t end) {
     Evaluator *e = static_cast<Evaluator *>(context);
     const Point *from = e->double_points.data();
-    e->double_tables.stencils->UpdateValues(from, e->double_points.data() + e->double_given.size() + begin,
-                                            (int)begin, (int)end);
+    Point *to = e->double_points.data() + e->double_given.size();
+    e->double_tables.stencils->UpdateValues(from, to, (int)begin, (int)end);
 }
 
 void evaluate_double(void *context, uint64_t begin, uint64_t end) {
