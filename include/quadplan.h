@@ -186,15 +186,24 @@ typedef struct qp_tessellation {
      * an edge get the same. */
     const float *patch_factors;
     /* 1 an edge of the mesh (qp_mesh_edge_vertices), 1 to 64, used when patch_factors is NULL; NULL: .factor everywhere. Patches
-     * get factors without cracks from them, n-gons and their neighbours included. */
+     * get factors without cracks from them, n-gons and their neighbours included: on an edge that an n-gon touches, equal and
+     * fractional_even round the factor up to a power of two. With fractional_odd, which has no sample in the middle of an edge, quads that
+     * an n-gon touches, and the quads connected with them, are tessellated as four quarters, each with half the factor; their samples
+     * and triangles follow quarter after quarter: [0,1/2] x [0,1/2], [1/2,1] x [0,1/2], [0,1/2] x [1/2,1], [1/2,1] x [1/2,1]. */
     const float *edge_factors;
+    /* 0: none. Otherwise, where both are NULL, the least factors (whole numbers, one an edge) with which no point of a triangle is
+     * farther than this, times the diagonal of the mesh's bounding box, from the limit surface at the same (u,v); .factor is then
+     * the largest one allowed, 0: 64. Chosen anew when it or the positions change, which takes about as long as making the plans. */
+    double tolerance;
 } qp_tessellation;
 
 enum {
     QP_SAMPLE_PAST_DEPTH =
         1, /* (u,v) lies below the plan's last level: an approximation was returned (only with
                                  no_exact_tail) */
-    QP_SAMPLE_NO_NORMAL = 2, /* no tangent plane there: the normal is a fallback, (0,0,0) */
+    QP_SAMPLE_NO_NORMAL =
+        2, /* no tangent plane there: the normal is that of the patch's middle, or z where it has none. Where du
+                                 and dv are parallel or vanish, the normal is the limit from within the patch, if there is one */
     QP_SAMPLE_LIMIT_FRAME =
         4 /* at an extraordinary or creased corner, where du and dv need not exist: they are tangents from
                                  limit masks, which span the tangent plane with du x dv along the normal; lengths are free */
@@ -215,6 +224,9 @@ typedef struct qp_stream {
     double hull_ms, domain_ms, frame_ms; /* of this evaluation; frame_ms is the whole without set-up */
     uint64_t support_bytes;              /* control points held */
     uint64_t hash;                       /* of the bytes of vertices; 0 unless asked for */
+    double bound;            /* with a tolerance: proven bound of the error, of the diagonal, rounding included; 0 without one */
+    uint64_t over_tolerance; /* patches whose bound is larger than the tolerance, as not even the largest factor is enough */
+    float factor_min, factor_mean, factor_max; /* with a tolerance: of the edges */
 } qp_stream;
 
 typedef struct qp_frame_options {

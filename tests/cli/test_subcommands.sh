@@ -7,7 +7,7 @@ check "help" [ "$code" -eq 0 ]
 check "help names the subcommands" grep -q devices "$work/stdout"
 run --version
 check "version" grep -qE '^quadplan [0-9]+\.[0-9]+\.[0-9]+$' "$work/stdout"
-for subcommand in info gen eval error stress render devices; do
+for subcommand in info gen eval error watertight stress render devices; do
     run "$subcommand" --help
     check "$subcommand --help" [ "$code" -eq 0 ]
     check "$subcommand --help names --json" grep -q -- --json "$work/stdout"
@@ -114,6 +114,21 @@ check "error above a threshold: one line" one_line
 keys "error above a threshold" position_max
 
 scene=$QUADPLAN_SOURCE_DIR/scenes/creased-torus.json
+for spacing in equal fractional_even fractional_odd; do
+    run watertight gen:random-closed,seed=4 --tess 20 --spacing "$spacing" --random-factors 7 --device host \
+        --json
+    check "watertight $spacing" [ "$code" -eq 0 ]
+    keys watertight edges samples position_mismatches normal_mismatches unmatched_samples \
+        sharp_edges_skipped worst_ulp
+    value 'o["position_mismatches"] == 0 and o["normal_mismatches"] == 0 and o["unmatched_samples"] == 0'
+    value 'o["edges"] > 0 and o["samples"] > 4 * o["edges"] and o["worst_ulp"] == 0'
+done
+run watertight gen:random-closed,seed=4 --tess 16 --no-sharing --json
+check "not watertight: exit 1" [ "$code" -eq 1 ]
+check "not watertight: one line" one_line
+check "not watertight: names a place" grep -qE 'patch [0-9]+ \(' "$work/stderr"
+value 'o["position_mismatches"] > 0 and o["normal_mismatches"] > 0 and 0 < o["worst_ulp"] < 100'
+
 run render "$scene" --size 96x64 --tess 4 --json -o "$work/picture.png"
 check "render" [ "$code" -eq 0 ]
 keys render scene picture width height patches samples triangles frame_ms stream_hash device gl
