@@ -27,38 +27,46 @@ QP_FUNCTION void QP_NAME(spline_grid)(__global const real4 *support, __global co
     QP_NAME(add_words)(support, words + 6, 0, bu, du, bv[3], dv[3], s);
 }
 
-QP_FUNCTION void QP_NAME(add_origin)(__global const real4 *support, uint origin, QP_NAME(surface_point) * s) {
-    if (origin != QP_NO_POINT) s->p = add4(support[origin], s->p);
+/* Leaves are evaluated with derivatives of order `orders` in place of the position: bit 0 is for u, bit 1 for v. 0, the position
+ * itself, makes samples; the others serve normals where du and dv are parallel (spline.h). */
+
+QP_FUNCTION void QP_NAME(add_origin)(__global const real4 *support, uint origin, uint orders,
+                                     QP_NAME(surface_point) * s) {
+    if (origin != QP_NO_POINT && orders == 0) s->p = add4(support[origin], s->p);
 }
 
 QP_FUNCTION void QP_NAME(eval_regular)(__global const real4 *support, __global const uint *node, real u,
-                                       real v, QP_NAME(surface_point) * s) {
+                                       real v, uint orders, QP_NAME(surface_point) * s) {
     real bu[4], du[4], bv[4], dv[4];
-    QP_NAME(basis)(QP_NAME(plain)(u), bu, du);
-    QP_NAME(basis)(QP_NAME(plain)(v), bv, dv);
+    QP_NAME(basis_of_order)(orders & 1u, QP_NAME(plain)(u), bu, du);
+    QP_NAME(basis_of_order)(orders >> 1, QP_NAME(plain)(v), bv, dv);
     QP_NAME(spline_grid)(support, node + 2, bu, du, bv, dv, s);
-    QP_NAME(add_origin)(support, node[1], s);
+    QP_NAME(add_origin)(support, node[1], orders, s);
 }
 
 #if QP_WITH_CREASE
 /* A single semi-sharp crease along v=0: across it the basis is that of the zone v lies in, times its matrix
  * (section 4.3; plan_layout.h). */
 QP_FUNCTION void QP_NAME(eval_crease)(__global const real4 *support, __global const uint *node,
-                                      __global const real *constants, real u, real signed_v,
+                                      __global const real *constants, real u, real signed_v, uint orders,
                                       QP_NAME(surface_point) * s) {
     real bu[4], du[4], b[4], d[4], bv[4], dv[4];
     const real v = QP_NAME(plain)(signed_v);
     const uint zone = v >= constants[0] ? 0u : v >= constants[1] ? 1u : 2u;
     const real scale = constants[2u + zone];
     __global const real *m = constants + 5u + 16u * zone;
-    QP_NAME(basis)(QP_NAME(plain)(u), bu, du);
-    QP_NAME(basis)(v * scale, b, d);
+    QP_NAME(basis_of_order)(orders & 1u, QP_NAME(plain)(u), bu, du);
+    QP_NAME(basis_of_order)(orders >> 1, v * scale, b, d);
     for (uint j = 0; j < 4u; ++j) {
         bv[j] = fma(b[3], m[12u + j], fma(b[2], m[8u + j], fma(b[1], m[4u + j], b[0] * m[j])));
         dv[j] = scale * fma(d[3], m[12u + j], fma(d[2], m[8u + j], fma(d[1], m[4u + j], d[0] * m[j])));
+        if ((orders >> 1) != 0) {
+            bv[j] *= scale;
+            dv[j] *= scale;
+        }
     }
     QP_NAME(spline_grid)(support, node + 2, bu, du, bv, dv, s);
-    QP_NAME(add_origin)(support, node[1], s);
+    QP_NAME(add_origin)(support, node[1], orders, s);
 }
 #endif
 
@@ -75,12 +83,12 @@ QP_FUNCTION void QP_NAME(add_slots)(__global const real4 *support, __global cons
 /* One of the three regular sub-domains of a terminal node's ring level: (u,v) with u >= 1/2 or v >= 1/2. Leaves the
  * origin out. */
 QP_FUNCTION void QP_NAME(eval_ring)(__global const real4 *support, __global const uint *ring, real u, real v,
-                                    QP_NAME(surface_point) * s) {
+                                    uint orders, QP_NAME(surface_point) * s) {
     real bu[4], du[4], bv[4], dv[4];
     const uint cx = QP_NAME(is_upper)(u, 1u), cy = QP_NAME(is_upper)(v, 1u);
     const uint slot = 5u * cy + cx - 1u;
-    QP_NAME(basis)(QP_NAME(plain)(QP_NAME(in_half)(u, cx)), bu, du);
-    QP_NAME(basis)(QP_NAME(plain)(QP_NAME(in_half)(v, cy)), bv, dv);
+    QP_NAME(basis_of_order)(orders & 1u, QP_NAME(plain)(QP_NAME(in_half)(u, cx)), bu, du);
+    QP_NAME(basis_of_order)(orders >> 1, QP_NAME(plain)(QP_NAME(in_half)(v, cy)), bv, dv);
     s->level += 1;
     QP_NAME(add_slots)(support, ring, slot, 1, bu, du, bv[0], dv[0], s);
     QP_NAME(add_slots)(support, ring, slot + 5u, 0, bu, du, bv[1], dv[1], s);
@@ -134,7 +142,7 @@ QP_FUNCTION void QP_NAME(eval_irregular)(__global const real4 *support, __global
 QP_FUNCTION void QP_NAME(eval_extraordinary)(__global const real4 *support, __global const uint *node,
                                              __global const real *constants, __global const uint *ring,
                                              uint rings, uint origin, real shrink, real u, real v,
-                                             QP_NAME(surface_point) * s) {
+                                             uint orders, QP_NAME(surface_point) * s) {
     /* Points 0..2 are 16-bit values in a word each. */
     const real4 limit = support[node[1]];
     if ((u == QP_R(0.0) && v == QP_R(0.0)) || ring == 0) {
@@ -162,16 +170,21 @@ QP_FUNCTION void QP_NAME(eval_extraordinary)(__global const real4 *support, __gl
     }
     /* Back to the level of the last ring, and what its points are scaled by. */
     s->level -= origin == QP_NO_POINT ? 1 : (int)rings;
-    QP_NAME(eval_ring)(support, ring, u, v, s);
-    if (origin == QP_NO_POINT) s->p = sub4(s->p, limit);
-    s->p = fma4(s->p, shrink, limit);
+    QP_NAME(eval_ring)(support, ring, u, v, orders, s);
+    if (orders == 0) {
+        if (origin == QP_NO_POINT)
+            s->p = sub4(s->p, limit);
+        else
+            s->size = QP_NAME(largest)(s->p) + QP_NAME(largest)(s->du) + QP_NAME(largest)(s->dv);
+        s->p = fma4(s->p, shrink, limit);
+    }
     if ((node[0] & QP_NODE_EXACT) == 0) s->flags |= QP_FLAG_PAST_DEPTH;
 }
 #endif
 
 /* The leaf of (u,v), evaluated; s->turn is how (u,v) was turned before. */
 QP_FUNCTION void QP_NAME(eval_tree)(__global const uint *tree, __global const real *constants,
-                                    __global const real4 *support, real u, real v,
+                                    __global const real4 *support, real u, real v, uint orders,
                                     QP_NAME(surface_point) * s) {
     __global const uint *node = tree;
 #if QP_WITH_TERMINAL && QP_WITH_CORNERS
@@ -182,6 +195,7 @@ QP_FUNCTION void QP_NAME(eval_tree)(__global const uint *tree, __global const re
     s->flags = 0;
     s->level = 0;
     s->stretch = QP_R(1.0);
+    s->size = QP_R(-1.0);
     for (;;) {
         const uint word = node[0], kind = QP_NODE_KIND(word);
 #if QP_WITH_INTERNAL
@@ -205,9 +219,10 @@ QP_FUNCTION void QP_NAME(eval_tree)(__global const uint *tree, __global const re
             real shrink = QP_R(1.0);
             for (uint k = 0; k < rings; ++k, ring += 12, shrink *= QP_R(0.5)) {
                 if (QP_NAME(is_upper)(u, 1u) != 0 || QP_NAME(is_upper)(v, 1u) != 0) {
-                    QP_NAME(eval_ring)(support, ring, u, v, s);
-                    if (k < absolute || origin == QP_NO_POINT) return;
+                    QP_NAME(eval_ring)(support, ring, u, v, orders, s);
+                    if (k < absolute || origin == QP_NO_POINT || orders != 0) return;
                     s->level -= (int)k;
+                    s->size = QP_NAME(largest)(s->p) + QP_NAME(largest)(s->du) + QP_NAME(largest)(s->dv);
                     s->p = fma4(s->p, shrink, support[origin]);
                     return;
                 }
@@ -232,7 +247,7 @@ QP_FUNCTION void QP_NAME(eval_tree)(__global const uint *tree, __global const re
         if (kind == QP_NODE_CREASE) {
             QP_NAME(rotate_uv)(QP_NODE_ROTATION(word), &u, &v);
             s->turn += QP_NODE_ROTATION(word);
-            QP_NAME(eval_crease)(support, node, constants + node[10], u, v, s);
+            QP_NAME(eval_crease)(support, node, constants + node[10], u, v, orders, s);
             return;
         }
 #endif
@@ -242,7 +257,7 @@ QP_FUNCTION void QP_NAME(eval_tree)(__global const uint *tree, __global const re
             QP_NAME(rotate_uv)(QP_NODE_ROTATION(word), &u, &v);
             s->turn += QP_NODE_ROTATION(word);
             QP_NAME(eval_extraordinary)
-            (support, node, constants, last_ring, last_rings, last_origin, last_shrink, u, v, s);
+            (support, node, constants, last_ring, last_rings, last_origin, last_shrink, u, v, orders, s);
             return;
         }
 #endif
@@ -251,9 +266,40 @@ QP_FUNCTION void QP_NAME(eval_tree)(__global const uint *tree, __global const re
             return;
         }
 #endif
-        QP_NAME(eval_regular)(support, node, u, v, s);
+        QP_NAME(eval_regular)(support, node, u, v, orders, s);
         return;
     }
+}
+
+/* A normal for a sample at (u,v) of the plan where du x dv vanishes. */
+QP_FUNCTION void QP_NAME(replace_normal)(__global const uint *tree, __global const real *constants,
+                                         __global const real4 *points, real u, real v, real size,
+                                         __global real *normal, __global uchar *flag) {
+    QP_NAME(surface_point) with_u, with_v, middle, s;
+    real4 n = make4(QP_R(0.0), QP_R(0.0), QP_R(0.0));
+    int found = 0;
+    for (uint k = 0; k < 7u; ++k) {
+        real at_u = u, at_v = v;
+        if (k == 2u) at_u = at_v = QP_R(0.5);
+        if (k > 2u && QP_NAME(step_aside)(k - 3u, &at_u, &at_v) == 0) continue;
+        s.turn = 0;
+        QP_NAME(eval_tree)(tree, constants, points, at_u, at_v, k == 0 ? 1u : k == 1u ? 2u : 0u, &s);
+        if (k == 0) with_u = s;
+        if (k == 1u) with_v = s;
+        if (k == 2u) {
+            middle = s;
+            found = ((with_u.flags | with_v.flags) & (QP_FLAG_LIMIT_FRAME | QP_FLAG_PAST_DEPTH)) == 0 &&
+                    QP_NAME(normal_from_within)(u, v, with_u, with_v, size, &n);
+        }
+        if (k > 2u && found != 0) found = QP_NAME(agrees_with)(n, s, size);
+    }
+    if (found != 0)
+        *flag &= (uchar)~QP_FLAG_NO_NORMAL;
+    else
+        n = QP_NAME(stand_in_normal)(middle, size);
+    normal[0] = n.x;
+    normal[1] = n.y;
+    normal[2] = n.z;
 }
 
 __kernel void QP_NAME(domain)(__global const uint *heads, __global const uint *trees,
@@ -269,18 +315,26 @@ __kernel void QP_NAME(domain)(__global const uint *heads, __global const uint *t
     __global const real4 *points = (__global const real4 *)support + QP_ENTRY_WIDE(entry, QP_ENTRY_SUPPORT);
     __global const real *us = grid_u + QP_ENTRY_WIDE(entry, QP_ENTRY_GRID);
     __global const real *vs = grid_v + QP_ENTRY_WIDE(entry, QP_ENTRY_GRID);
-    __global const real *base =
-        positions + QP_POSITION_FIRST + 3u * (ulong)rings[QP_ENTRY_WIDE(entry, QP_ENTRY_RING)];
+    __global const real *first = positions + QP_POSITION_FIRST;
+    __global const uint *ring = rings + QP_ENTRY_WIDE(entry, QP_ENTRY_RING);
+    __global const real *base = first + 3u * (ulong)ring[0];
     const real4 origin = make4(base[0], base[1], base[2]);
     const ulong out = QP_ENTRY_WIDE(entry, QP_ENTRY_OUT);
     const uint rotation = entry[QP_ENTRY_ROTATION];
     const uint samples = entry[QP_ENTRY_SAMPLES];
 
+    real size = QP_R(0.0);
+    for (uint j = 1; j < head[QP_HEAD_RING]; ++j) {
+        __global const real *p = first + 3u * (ulong)ring[j];
+        const real most = QP_NAME(largest)(make4(p[0] - origin.x, p[1] - origin.y, p[2] - origin.z));
+        size = most > size ? most : size;
+    }
+
     /* Lanes past the last sample are not written: they keep an older sample, or two unit vectors to begin with. */
-    real value[9][QP_LANES];
+    real value[10][QP_LANES];
     uint flag[QP_LANES];
     for (uint l = 0; l < QP_LANES; ++l) {
-        for (uint k = 0; k < 9u; ++k) value[k][l] = k == 3u || k == 7u;
+        for (uint k = 0; k < 10u; ++k) value[k][l] = k == 3u || k == 7u;
         flag[l] = 0;
     }
     const uint step = (uint)get_local_size(0) * QP_LANES;
@@ -292,7 +346,7 @@ __kernel void QP_NAME(domain)(__global const uint *heads, __global const uint *t
             real u = us[i + l], v = vs[i + l];
             QP_NAME(rotate_uv)(rotation, &u, &v);
             s.turn = rotation;
-            QP_NAME(eval_tree)(tree, constants, points, u, v, &s);
+            QP_NAME(eval_tree)(tree, constants, points, u, v, 0u, &s);
             value[0][l] = s.p.x;
             value[1][l] = s.p.y;
             value[2][l] = s.p.z;
@@ -302,6 +356,7 @@ __kernel void QP_NAME(domain)(__global const uint *heads, __global const uint *t
             value[6][l] = s.dv.x;
             value[7][l] = s.dv.y;
             value[8][l] = s.dv.z;
+            value[9][l] = s.size < QP_R(0.0) ? size : s.size;
             flag[l] = s.flags;
             if (want_derivatives != 0)
                 QP_NAME(write_derivatives)
@@ -314,6 +369,16 @@ __kernel void QP_NAME(domain)(__global const uint *heads, __global const uint *t
             du[c] = load_lanes(value[3u + c]);
             dv[c] = load_lanes(value[6u + c]);
         }
-        QP_NAME(write_samples)(vertices, flags, out + i, block, positions, origin, p, du, dv, flag);
+        if (QP_NAME(write_samples)(vertices, flags, out + i, block, positions, origin, p, du, dv,
+                                   load_lanes(value[9]), flag)) {
+            for (uint l = 0; l < block; ++l) {
+                if ((flag[l] & QP_FLAG_NO_NORMAL) == 0) continue;
+                real u = us[i + l], v = vs[i + l];
+                const ulong at = out + i + l;
+                QP_NAME(rotate_uv)(rotation, &u, &v);
+                QP_NAME(replace_normal)
+                (tree, constants, points, u, v, value[9][l], vertices + 6u * at + 3u, flags + at);
+            }
+        }
     }
 }

@@ -6,11 +6,13 @@
 #define QP_R(constant) constant
 #define QP_TINY 0x1p-900 /* a squared length between these is as good as any; outside, rescale first */
 #define QP_HUGE 0x1p+900
+#define QP_NOISE 0x1p-49 /* sixteen times the unit roundoff */
 #define QP_CORRECT_DIVIDE 1
 #else
 #define QP_R(constant) constant##f
 #define QP_TINY 0x1p-90f
 #define QP_HUGE 0x1p+90f
+#define QP_NOISE 0x1p-20f
 #endif
 
 #ifdef __OPENCL_VERSION__
@@ -47,12 +49,14 @@ typedef real lanes;
 #define plain_lanes(a) QP_NAME(plain)(a)
 #define store_lanes(v, p) (*(p) = (v))
 #define lanes_within(a, low, high) ((a) > (low) && (a) < (high))
+#define lanes_above(a, b) ((a) > (b))
 #else
 typedef QP_JOIN(QP_REAL_NAME, QP_LANES) lanes;
 #define load_lanes(p) QP_JOIN(vload, QP_LANES)(0, (p))
 #define plain_lanes(a) select((a), (a) + (lanes)(QP_R(1.0)), QP_JOIN(QP_AS_BITS, QP_LANES)(a))
 #define store_lanes(v, p) QP_JOIN(vstore, QP_LANES)((v), 0, (p))
 #define lanes_within(a, low, high) all((a) > (lanes)(low) && (a) < (lanes)(high))
+#define lanes_above(a, b) all((a) > (b))
 #endif
 #define splat(x) ((lanes)(x))
 #define neg_lanes(a) (-(a))
@@ -162,6 +166,7 @@ QP_FUNCTION real4 fma4(real4 a, real s, real4 c) {
 #define plain_lanes QP_NAME(plain_lanes)
 #define store_lanes QP_NAME(store_lanes)
 #define lanes_within QP_NAME(lanes_within)
+#define lanes_above QP_NAME(lanes_above)
 #define splat QP_NAME(splat)
 #define neg_lanes QP_NAME(neg_lanes)
 #define add_lanes QP_NAME(add_lanes)
@@ -194,6 +199,11 @@ QP_FUNCTION void store_lanes(lanes a, real *p) {
 QP_FUNCTION int lanes_within(lanes a, real low, real high) {
     int good = 1;
     for (uint i = 0; i < QP_LANES; ++i) good &= a.v[i] > low && a.v[i] < high;
+    return good;
+}
+QP_FUNCTION int lanes_above(lanes a, lanes b) {
+    int good = 1;
+    for (uint i = 0; i < QP_LANES; ++i) good &= a.v[i] > b.v[i];
     return good;
 }
 QP_FUNCTION lanes neg_lanes(lanes a) {

@@ -2,6 +2,7 @@
 #undef QP_R
 #undef QP_TINY
 #undef QP_HUGE
+#undef QP_NOISE
 #undef QP_CORRECT_DIVIDE
 #undef QP_NAME
 #undef QP_LANES
@@ -22,6 +23,7 @@
 #undef plain_lanes
 #undef store_lanes
 #undef lanes_within
+#undef lanes_above
 #undef splat
 #undef neg_lanes
 #undef add_lanes

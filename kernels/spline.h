@@ -49,11 +49,12 @@ QP_FUNCTION void QP_NAME(basis_lanes)(lanes t, lanes b[4], lanes d[4]) {
  * scale, which is all that a normal needs. */
 typedef struct QP_NAME(surface_point) {
     real4 p, du, dv;
-    real size; /* of the numbers that p, du and dv were made from, which tells their rounding; < 0: the patch's */
+    real
+        size; /* of the numbers that p, du and dv were made from, which tells their rounding; < 0: the patch's */
     uint flags;
     int level; /* the leaf is 2^-level of the patch, or would be, were its points not stored times a power of two */
     real stretch; /* factor left out of du and dv, which are to be multiplied by it */
-    uint turn; /* rotation of the leaf's (u,v) against the patch's, mod 4 */
+    uint turn;    /* rotation of the leaf's (u,v) against the patch's, mod 4 */
 } QP_NAME(surface_point);
 
 /* Adds row j of a 4x4 grid of points: bu, du weigh the row's points; bv, dv the row. Rows first, then across:
@@ -71,6 +72,25 @@ QP_FUNCTION void QP_NAME(add_row)(QP_NAME(surface_point) * s, int first, real4 p
         s->du = fma4(slope, bv, s->du);
         s->dv = fma4(along, dv, s->dv);
     }
+}
+
+/* Coordinates, as frame_layout.h holds them. 1 - x: */
+QP_FUNCTION real QP_NAME(mirrored)(real x) {
+    return x == QP_R(0.5) ? x : -x;
+}
+/* Is x >= 1/2, or (upper_middle 0) x > 1/2? */
+QP_FUNCTION uint QP_NAME(is_upper)(real x, uint upper_middle) {
+    return signbit(x) != 0 || (upper_middle != 0 && x == QP_R(0.5));
+}
+/* 2x - upper: the place in that half of [0,1]. */
+QP_FUNCTION real QP_NAME(in_half)(real x, uint upper) {
+    const real t = QP_R(2.0) * fabs(x);
+    const real lower = t <= QP_R(0.5) ? t : -(QP_R(1.0) - t);
+    return upper != 0 ? QP_NAME(mirrored)(lower) : lower;
+}
+/* As a number in [0,1]; rounds numbers close to 1. */
+QP_FUNCTION real QP_NAME(plain)(real x) {
+    return signbit(x) != 0 ? QP_R(1.0) + x : x;
 }
 
 /* a b - c d to within an ulp or so, exactly 0 for equal products (Kahan). */
@@ -138,18 +158,44 @@ QP_FUNCTION void QP_NAME(turn_pair)(uint turn, real4 da, real4 db, real4 *u, rea
     *v = scale4((turn & 1u) != 0 ? da : db, (turn & 2u) != 0 ? QP_R(-1.0) : QP_R(1.0));
 }
 
+/* What stands for a normal where there is no tangent plane: that of the middle of the patch, or z. */
+QP_FUNCTION real4 QP_NAME(stand_in_normal)(QP_NAME(surface_point) middle, real size) {
+    uint flags = 0;
+    const real4 n = QP_NAME(unit_normal)(middle.du, middle.dv, size, &flags);
+    return flags == 0 ? n : make4(QP_R(0.0), QP_R(0.0), QP_R(1.0));
+}
+
+/* Moves (u,v) an eighth of the patch towards side k (0 to 3). False where that leaves it. */
+QP_FUNCTION int QP_NAME(step_aside)(uint k, real *u, real *v) {
+    real *x = k < 2u ? u : v;
+    const real to = QP_NAME(plain)(*x) + ((k & 1u) != 0 ? QP_R(0.125) : QP_R(-0.125));
+    *x = to <= QP_R(0.5) ? to : -(QP_R(1.0) - to);
+    return to >= QP_R(0.0) && to <= QP_R(1.0);
+}
+
+/* Is a sample's own normal, if it has one, within 60 degrees of n? */
+QP_FUNCTION int QP_NAME(agrees_with)(real4 n, QP_NAME(surface_point) s, real size) {
+    uint flags = 0;
+    const real4 m = QP_NAME(unit_normal)(s.du, s.dv, size, &flags);
+    return flags != 0 || fma(m.z, n.z, fma(m.y, n.y, m.x * n.x)) >= QP_R(0.5);
+}
+
 /* Where N = du x dv vanishes, the normal is the limit of N / |N| from within the patch, if that is the same from all sides: to
  * first order N changes by t DN d in direction d, so the limit is DN d / |DN d| for every d that points into the patch. Inside an
  * edge of the patch both d and -d along it do, so DN must vanish along it (as it does where an edge is pulled together into a
- * point); at its corners both must give the same; within it DN must vanish, and no normal is found.
+ * point); at its corners both must give the same; within it DN must vanish, and no normal is found. Along an edge where DN d
+ * vanishes and N does not, higher orders may turn it over: agrees_with() looks there.
  * u, v: the place in the patch. with_u: (du, duu, duv) in p, du, dv; with_v: (dv, duv, dvv); both in the leaf's frame.
  * False where there is none. */
 QP_FUNCTION int QP_NAME(normal_from_within)(real u, real v, QP_NAME(surface_point) with_u,
                                             QP_NAME(surface_point) with_v, real size, real4 *normal) {
-    const real4 na = add4(QP_NAME(cross_product)(with_u.du, with_v.p), QP_NAME(cross_product)(with_u.p, with_v.du));
-    const real4 nb = add4(QP_NAME(cross_product)(with_u.dv, with_v.p), QP_NAME(cross_product)(with_u.p, with_v.dv));
-    const real slopes = QP_NAME(largest)(with_u.p) + QP_NAME(largest)(with_v.p) + QP_NAME(largest)(with_u.du) +
-                        QP_NAME(largest)(with_u.dv) + QP_NAME(largest)(with_v.dv);
+    const real4 na =
+        add4(QP_NAME(cross_product)(with_u.du, with_v.p), QP_NAME(cross_product)(with_u.p, with_v.du));
+    const real4 nb =
+        add4(QP_NAME(cross_product)(with_u.dv, with_v.p), QP_NAME(cross_product)(with_u.p, with_v.dv));
+    const real slopes = QP_NAME(largest)(with_u.p) + QP_NAME(largest)(with_v.p) +
+                        QP_NAME(largest)(with_u.du) + QP_NAME(largest)(with_u.dv) +
+                        QP_NAME(largest)(with_v.dv);
     const real least = QP_R(4.0) * QP_NOISE * size * slopes;
     real4 along[2], found = make4(QP_R(0.0), QP_R(0.0), QP_R(0.0));
     int count = 0, power;
@@ -165,25 +211,6 @@ QP_FUNCTION int QP_NAME(normal_from_within)(real u, real v, QP_NAME(surface_poin
     }
     *normal = found;
     return count != 0;
-}
-
-/* Coordinates, as frame_layout.h holds them. 1 - x: */
-QP_FUNCTION real QP_NAME(mirrored)(real x) {
-    return x == QP_R(0.5) ? x : -x;
-}
-/* Is x >= 1/2, or (upper_middle 0) x > 1/2? */
-QP_FUNCTION uint QP_NAME(is_upper)(real x, uint upper_middle) {
-    return signbit(x) != 0 || (upper_middle != 0 && x == QP_R(0.5));
-}
-/* 2x - upper: the place in that half of [0,1]. */
-QP_FUNCTION real QP_NAME(in_half)(real x, uint upper) {
-    const real t = QP_R(2.0) * fabs(x);
-    const real lower = t <= QP_R(0.5) ? t : -(QP_R(1.0) - t);
-    return upper != 0 ? QP_NAME(mirrored)(lower) : lower;
-}
-/* As a number in [0,1]; rounds numbers close to 1. */
-QP_FUNCTION real QP_NAME(plain)(real x) {
-    return signbit(x) != 0 ? QP_R(1.0) + x : x;
 }
 
 /* Turns (u,v) by rotation r, see plan_layout.h. */
@@ -209,26 +236,25 @@ QP_FUNCTION void QP_NAME(write_derivatives)(__global real *out, real4 da, real4 
 
 /* The same for the first `block` lanes of a leaf that is the whole patch. */
 QP_FUNCTION void QP_NAME(write_lane_derivatives)(__global real *derivatives, ulong i, uint block,
-                                                 __global const real *positions, uint turn,
-                                                 const lanes du[3], const lanes dv[3]) {
+                                                 __global const real *positions, uint turn, const lanes du[3],
+                                                 const lanes dv[3]) {
     real slopes[6][QP_LANES];
     for (uint c = 0; c < 3u; ++c) {
         store_lanes(du[c], slopes[c]);
         store_lanes(dv[c], slopes[3u + c]);
     }
-    for (uint l = 0; l < block; ++l)
-        QP_NAME(write_derivatives)
+    for (uint l = 0; l < block; ++l) QP_NAME(write_derivatives)
     (derivatives + 6u * (i + l), make4(slopes[0][l], slopes[1][l], slopes[2][l]),
      make4(slopes[3][l], slopes[4][l], slopes[5][l]), turn, positions[QP_POSITION_SCALE]);
 }
 
 /* Writes QP_LANES samples, or the first `block` of them, from sample i on: their positions relative to origin, their
- * derivatives and flags. unit_normal() for lanes; those whose cross product is of no ordinary length go through
- * unit_normal() itself. */
-QP_FUNCTION void QP_NAME(write_samples)(__global real *vertices, __global uchar *flags, ulong i, uint block,
-                                        __global const real *positions, real4 origin, const lanes p[3],
-                                        const lanes du[3], const lanes dv[3], lanes size,
-                                        uint flag[QP_LANES]) {
+ * normals and flags. Lanes flagged QP_FLAG_NO_NORMAL still want a normal from replace_normal(). unit_normal() for lanes; those whose cross product is of no ordinary length go through
+ * unit_normal() itself. Returns whether some may be flagged so. */
+QP_FUNCTION int QP_NAME(write_samples)(__global real *vertices, __global uchar *flags, ulong i, uint block,
+                                       __global const real *positions, real4 origin, const lanes p[3],
+                                       const lanes du[3], const lanes dv[3], lanes size,
+                                       uint flag[QP_LANES]) {
     lanes n[3];
     real result[6][QP_LANES];
     for (uint c = 0; c < 3u; ++c) {
@@ -248,8 +274,9 @@ QP_FUNCTION void QP_NAME(write_samples)(__global real *vertices, __global uchar 
     const lanes slopes2 =
         add_lanes(fma_lanes(du[2], du[2], fma_lanes(du[1], du[1], mul_lanes(du[0], du[0]))),
                   fma_lanes(dv[2], dv[2], fma_lanes(dv[1], dv[1], mul_lanes(dv[0], dv[0]))));
-    if (!lanes_within(length2, QP_TINY, QP_HUGE) ||
-        !lanes_above(length2, mul_lanes(mul_lanes(noise, noise), slopes2))) {
+    const int special = !lanes_within(length2, QP_TINY, QP_HUGE) ||
+                        !lanes_above(length2, mul_lanes(mul_lanes(noise, noise), slopes2));
+    if (special) {
         real slopes[6][QP_LANES], sizes[QP_LANES];
         store_lanes(size, sizes);
         for (uint c = 0; c < 3u; ++c) {
@@ -257,9 +284,9 @@ QP_FUNCTION void QP_NAME(write_samples)(__global real *vertices, __global uchar 
             store_lanes(dv[c], slopes[3u + c]);
         }
         for (uint l = 0; l < QP_LANES; ++l) {
-            const real4 m = QP_NAME(unit_normal)(make4(slopes[0][l], slopes[1][l], slopes[2][l]),
-                                                 make4(slopes[3][l], slopes[4][l], slopes[5][l]), sizes[l],
-                                                 &flag[l]);
+            const real4 m =
+                QP_NAME(unit_normal)(make4(slopes[0][l], slopes[1][l], slopes[2][l]),
+                                     make4(slopes[3][l], slopes[4][l], slopes[5][l]), sizes[l], &flag[l]);
             result[3][l] = m.x;
             result[4][l] = m.y;
             result[5][l] = m.z;
@@ -276,4 +303,5 @@ QP_FUNCTION void QP_NAME(write_samples)(__global real *vertices, __global uchar 
         out[5] = result[5][l];
         out_flags[l] = (uchar)flag[l];
     }
+    return special;
 }

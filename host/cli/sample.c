@@ -156,7 +156,7 @@ static qp_status run(int argc, char **argv, qp_error *err) {
 const cli_command cli_sample = {
     "sample", "MESH", "Evaluates position, derivatives and normal at any points.",
     CLI_MESH_HELP
-    "\nFlags: 1 past the plans' depth (--no-exact-tail only), 2 no tangent plane there (the normal is 0), 4 "
+    "\nFlags: 1 past the plans' depth (--no-exact-tail only), 2 no tangent plane there (the normal is the patch's middle's), 4 "
     "du and dv are a\n"
     "limit frame: tangents that span the tangent plane where derivatives need not exist. Any (u,v) is exact.",
     run};

@@ -56,6 +56,7 @@ static double angle(const double a[3], const double b[3]) {
            57.29577951308232;
 }
 
+/* n: NULL where the sample is flagged as without one. */
 static void measure_normal(const double *n, const qp_reference_sample *ref, uint32_t patch, const double *uv,
                            bool past, partial *to) {
     qp_error_report *r = &to->report;
@@ -63,7 +64,7 @@ static void measure_normal(const double *n, const qp_reference_sample *ref, uint
         r->normals_undefined++;
         return;
     }
-    double degrees = angle(n, ref->n);
+    double degrees = n != NULL ? angle(n, ref->n) : 180;
     if (past) {
         r->past_normal_max_deg = fmax(r->past_normal_max_deg, degrees);
         return;
@@ -113,7 +114,7 @@ static void measure(const compare *c, uint64_t i, const qp_reference_sample *ref
             r->worst_v = uv[1];
         }
     }
-    measure_normal(got + 3, ref, patch, uv, past, to);
+    measure_normal(c->stream->flags[i] & QP_SAMPLE_NO_NORMAL ? NULL : got + 3, ref, patch, uv, past, to);
 }
 
 static qp_status compare_patch(compare *c, uint32_t patch, unsigned worker, partial *to) {

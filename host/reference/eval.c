@@ -53,7 +53,9 @@ static void set_normal(qp_reference_sample *s) {
     double nn = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
     double uu = sqrt(s->du[0] * s->du[0] + s->du[1] * s->du[1] + s->du[2] * s->du[2]);
     double vv = sqrt(s->dv[0] * s->dv[0] + s->dv[1] * s->dv[1] + s->dv[2] * s->dv[2]);
-    s->normal_defined = nn > 0 && nn >= 1e-6 * uu * vv;
+    /* One that is so much smaller than the other is 0 but for rounding. */
+    const bool both = uu > 1e-14 * vv && vv > 1e-14 * uu;
+    s->normal_defined = both && nn > 0 && nn >= 1e-6 * uu * vv;
     s->sine = s->normal_defined ? nn / (uu * vv) : 0;
     for (int c = 0; c < 3; ++c) s->n[c] = s->normal_defined ? n[c] / nn : 0;
 }

@@ -44,7 +44,7 @@ typedef struct qp_error_report {
  * number of threads. Samples flagged QP_SAMPLE_PAST_DEPTH are counted apart. Float streams are compared with
  * the surface of the positions rounded to float, which is what the kernels were given, double streams with
  * that of the positions themselves. uv: the points where the stream was evaluated, 2 a sample; NULL: stream->uv, which holds the
- * tessellator's points in full. A sample that has no normal where the reference has one counts as 180
+ * tessellator's points in full. A sample flagged as without a normal where the reference has one counts as 180
  * degrees off; samples that are not finite are counted and left out of the measures. QP_BAD_INPUT when a
  * sample lies on a patch without surface or outside [0,1]^2. */
 qp_status qp_reference_compare(const qp_mesh *mesh, const qp_stream *stream, const double *uv,
