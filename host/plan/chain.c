@@ -45,7 +45,15 @@ static uint32_t put_terminal(qp_builder *b, const qp_chain *chain, uint32_t orig
 /* Ends the chain an item belongs to, so that the item's own node becomes its tail. */
 void qp_plan_close_chain(qp_builder *b, qp_item *item) {
     if (item->chain == QP_NONE) return;
-    item->parent_word = put_terminal(b, &b->chains[item->chain], QP_NO_POINT);
+    const qp_chain *chain = &b->chains[item->chain];
+    uint32_t origin = QP_NO_POINT;
+    for (uint32_t i = 0; i < 4; ++i) {
+        if (chain->corner_u == (qp_plan_corner_high_u(i) ? QP_PLAN_ONE : 0) &&
+            chain->corner_v == (qp_plan_corner_high_v(i) ? QP_PLAN_ONE : 0))
+            origin = qp_plan_corner_origin(b, i);
+    }
+    if (b->failed || b->too_large) return;
+    item->parent_word = put_terminal(b, chain, origin);
     item->chain = QP_NONE;
 }
 
@@ -158,7 +166,7 @@ static qp_fan *move_fan(qp_local *tail, qp_level *to, const qp_level *from, cons
     uint32_t spokes = qp_fan_spokes(fan);
     qp_fan *moved = qp_arena_get(&to->arena, sizeof *moved);
     uint32_t *words = qp_arena_get(&to->arena, ((size_t)spokes + fan->faces) * sizeof *words);
-    float *floats = qp_arena_get(&to->arena, 2 * (size_t)spokes * sizeof *floats);
+    float *floats = qp_arena_get(&to->arena, (2 * (size_t)spokes + fan->others) * sizeof *floats);
     if (moved == NULL || words == NULL || floats == NULL) return NULL;
     *moved = *fan;
     moved->vertex = move_point(tail, to, from, fan->vertex, limit);
@@ -169,8 +177,12 @@ static qp_fan *move_fan(qp_local *tail, qp_level *to, const qp_level *from, cons
     for (uint32_t j = 0; j < spokes; ++j) moved->spoke[j] = move_point(tail, to, from, fan->spoke[j], limit);
     for (uint32_t j = 0; j < fan->faces; ++j)
         moved->diagonal[j] = move_point(tail, to, from, fan->diagonal[j], limit);
+    for (uint32_t t = 0; t < 2 && fan->through; ++t)
+        moved->end[t] = move_point(tail, to, from, fan->end[t], limit);
     memcpy(moved->sharp, fan->sharp, spokes * sizeof *floats);
     memcpy(moved->far_sharp, fan->far_sharp, spokes * sizeof *floats);
+    moved->other_sharp = floats + 2 * (size_t)spokes;
+    if (fan->others > 0) memcpy(moved->other_sharp, fan->other_sharp, fan->others * sizeof *floats);
     return moved;
 }
 

@@ -101,6 +101,62 @@ static float far_sharpness(const qp_mesh *mesh, uint32_t vertex, uint32_t edge) 
     return qp_sharp_chaikin(own, sum, count);
 }
 
+/* The vertex of corner i's fan lies on a crease of two non-manifold edges, and is no corner for ever (qp_fan). */
+static bool is_through(const qp_gather *g, const qp_mesh *mesh, uint32_t i) {
+    const uint32_t vertex = mesh->face_vertices[fan_corner(g, i, 0)];
+    return (mesh->vertex_flags[vertex] & QP_VERTEX_NONMANIFOLD) &&
+           !qp_sharp_is_infinite(mesh->vertex_sharpness[vertex]);
+}
+
+/* The two edges, that of spoke 0 first where the fan has it; tells whether the fan lies beside them. */
+static bool find_ends(const qp_gather *g, const qp_mesh *mesh, uint32_t i, uint32_t edges[2]) {
+    const uint32_t vertex = mesh->face_vertices[fan_corner(g, i, 0)];
+    uint32_t found = 0, far;
+    for (uint32_t k = mesh->vertex_offsets[vertex]; k < mesh->vertex_offsets[vertex + 1]; ++k) {
+        const uint32_t h = mesh->vertex_corners[k];
+        const uint32_t sides[2] = {mesh->corner_edge[h], mesh->corner_edge[qp_corner_prev(mesh, h)]};
+        for (uint32_t s = 0; s < 2 && found < 2; ++s) {
+            if (!(mesh->edge_flags[sides[s]] & QP_EDGE_NONMANIFOLD)) continue;
+            if (found == 0 || edges[0] != sides[s]) edges[found++] = sides[s];
+        }
+    }
+    if (g->closed[i]) return true;
+    if (edges[0] != spoke_edge(g, mesh, i, 0, &far)) {
+        const uint32_t swap = edges[0];
+        edges[0] = edges[1];
+        edges[1] = swap;
+    }
+    return spoke_edge(g, mesh, i, fan_faces(g, i), &far) != edges[1];
+}
+
+static bool fan_has_edge(const qp_gather *g, const qp_mesh *mesh, uint32_t i, uint32_t edge) {
+    uint32_t far;
+    for (uint32_t j = 0; j < fan_spokes(g, i); ++j)
+        if (spoke_edge(g, mesh, i, j, &far) == edge) return true;
+    return false;
+}
+
+static int compare_floats(const void *a, const void *b) {
+    const float x = *(const float *)a, y = *(const float *)b;
+    return (x > y) - (x < y);
+}
+
+/* Sharpness of the sharp edges in the vertex's other fans, increasing; none of them is a boundary, and each has two faces there, so
+ * that one of its corners at the vertex begins with it. Their number; others may be NULL. */
+static uint32_t other_edges(const qp_gather *g, const qp_mesh *mesh, uint32_t i, float *others) {
+    const uint32_t vertex = mesh->face_vertices[fan_corner(g, i, 0)];
+    uint32_t count = 0;
+    for (uint32_t k = mesh->vertex_offsets[vertex]; k < mesh->vertex_offsets[vertex + 1]; ++k) {
+        const uint32_t edge = mesh->corner_edge[mesh->vertex_corners[k]];
+        if (mesh->edge_sharpness[edge] <= 0.0f || (mesh->edge_flags[edge] & QP_EDGE_NONMANIFOLD)) continue;
+        if (fan_has_edge(g, mesh, i, edge)) continue;
+        if (others != NULL) others[count] = mesh->edge_sharpness[edge];
+        ++count;
+    }
+    if (others != NULL) qsort(others, count, sizeof *others, compare_floats);
+    return count;
+}
+
 static uint32_t float_bits(float f) {
     uint32_t bits;
     f = f == 0.0f ? 0.0f : f; /* -0 is 0 */
@@ -111,6 +167,30 @@ static uint32_t float_bits(float f) {
 static float spoke_far_sharpness(const qp_gather *g, const qp_mesh *mesh, uint32_t i, uint32_t j) {
     uint32_t far, edge = spoke_edge(g, mesh, i, j, &far);
     return far_sharpness(mesh, far, edge);
+}
+
+/* What the other fans of a through vertex add to its key. */
+static bool push_through_words(qp_gather *g, const qp_mesh *mesh, uint32_t i) {
+    uint32_t edges[2] = {QP_NONE, QP_NONE};
+    const uint32_t others = other_edges(g, mesh, i, NULL);
+    size_t count = g->word_begin[i + 1];
+    float *sharp = qp_alloc(others, sizeof *sharp, false);
+    if (sharp == NULL ||
+        !qp_grow((void **)&g->words, &g->word_capacity, count + 1 + (size_t)others, sizeof *g->words)) {
+        free(sharp);
+        return false;
+    }
+    other_edges(g, mesh, i, sharp);
+    /* The corner's first word is at most 2^30 otherwise. */
+    g->words[g->word_begin[i]] |= 0x80000000u;
+    g->words[count++] = others << 1 | (find_ends(g, mesh, i, edges) ? 1u : 0u);
+    for (uint32_t j = 0; j < others; ++j) {
+        g->words[count++] = float_bits(sharp[j]);
+        if (qp_sharp_is_semi(sharp[j])) g->has_semi = true;
+    }
+    free(sharp);
+    g->word_begin[i + 1] = (uint32_t)count;
+    return true;
 }
 
 static bool push_corner_words(qp_gather *g, const qp_mesh *mesh, uint32_t i) {
@@ -136,7 +216,7 @@ static bool push_corner_words(qp_gather *g, const qp_mesh *mesh, uint32_t i) {
         if (mesh->crease_method == QP_CREASE_CHAIKIN) w[count++] = float_bits(far_sharpness(mesh, far, edge));
     }
     g->word_begin[i + 1] = (uint32_t)count;
-    return true;
+    return !is_through(g, mesh, i) || push_through_words(g, mesh, i);
 }
 
 bool qp_gather_face(qp_gather *g, const qp_mesh *mesh, uint32_t face) {
@@ -281,6 +361,7 @@ static bool prepare_entries(qp_gather *g, const qp_mesh *mesh) {
         entries += qp_face_size(mesh, mesh->corner_face[g->corners[f]]);
     }
     g->entry_begin[fans] = entries;
+    entries += 2 * g->n; /* for the ends of creases that corners' fans lack */
     if (!qp_grow((void **)&g->parent, &g->entry_capacity[1], entries, sizeof(uint32_t)) ||
         !qp_grow((void **)&g->column, &g->entry_capacity[2], entries, sizeof(uint32_t))) {
         return false;
@@ -292,6 +373,22 @@ static bool prepare_entries(qp_gather *g, const qp_mesh *mesh) {
     join_entries(g);
     g->width = 0;
     g->joined = true;
+    return true;
+}
+
+/* Columns for the ends of the crease through corner i's vertex that its fan lacks. */
+static uint32_t end_entry(const qp_gather *g, uint32_t i, uint32_t t) {
+    return g->entry_begin[g->begin[g->n]] + 2 * i + t;
+}
+
+static bool assign_ends(qp_gather *g, const qp_mesh *mesh, uint32_t i) {
+    uint32_t edges[2] = {QP_NONE, QP_NONE};
+    const uint32_t vertex = mesh->face_vertices[fan_corner(g, i, 0)];
+    if (!find_ends(g, mesh, i, edges)) return true;
+    for (uint32_t t = g->closed[i] ? 0 : 1; t < 2; ++t) {
+        const uint32_t *v = mesh->edge_vertices + 2 * (size_t)edges[t];
+        if (!assign_column(g, end_entry(g, i, t), v[v[0] == vertex])) return false;
+    }
     return true;
 }
 
@@ -313,6 +410,7 @@ bool qp_gather_ring(qp_gather *g, const qp_mesh *mesh, uint32_t start) {
                     return false;
             }
         }
+        if (is_through(g, mesh, i) && !assign_ends(g, mesh, i)) return false;
     }
     return true;
 }
@@ -321,6 +419,19 @@ bool qp_gather_ring(qp_gather *g, const qp_mesh *mesh, uint32_t start) {
 
 static uint32_t entry_column(qp_gather *g, uint32_t e) {
     return g->column[find_root(g->parent, e)];
+}
+
+static bool fill_through(qp_gather *g, const qp_mesh *mesh, uint32_t i, qp_arena *arena, qp_fan *fan) {
+    uint32_t edges[2] = {QP_NONE, QP_NONE};
+    fan->through = true;
+    fan->beside = find_ends(g, mesh, i, edges);
+    fan->end[0] = fan->closed ? entry_column(g, end_entry(g, i, 0)) : fan->spoke[0];
+    fan->end[1] = fan->beside ? entry_column(g, end_entry(g, i, 1)) : fan->spoke[fan->faces];
+    fan->others = other_edges(g, mesh, i, NULL);
+    fan->other_sharp = qp_arena_get(arena, fan->others * sizeof *fan->other_sharp);
+    if (fan->other_sharp == NULL) return false;
+    other_edges(g, mesh, i, fan->other_sharp);
+    return true;
 }
 
 static bool fill_fan(qp_gather *g, const qp_mesh *mesh, uint32_t i, uint32_t first_face, qp_local *local,
@@ -355,7 +466,7 @@ static bool fill_fan(qp_gather *g, const qp_mesh *mesh, uint32_t i, uint32_t fir
         fan->far_sharp[j] =
             local->chaikin ? spoke_far_sharpness(g, mesh, i, j) : qp_sharp_decrement(fan->sharp[j]);
     }
-    return true;
+    return !is_through(g, mesh, i) || fill_through(g, mesh, i, arena, fan);
 }
 
 qp_cell *qp_gather_cell(qp_gather *g, const qp_mesh *mesh, uint32_t start, qp_local *local) {

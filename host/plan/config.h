@@ -2,8 +2,8 @@
  * order.
  *
  * The key lists, for every corner of the base face from the starting corner on, the fan around it (closed or
- * open, sizes of its faces, place of the base face) and the sharpness of the vertex and of every spoke: all
- * that the local refinement of local.h reads. The ring is unfolded: a mesh vertex that is reached by two
+ * open, sizes of its faces, place of the base face) and the sharpness of the vertex and of every spoke, and what other fans of the
+ * vertex have a say in its rule: all that the local refinement of local.h reads. The ring is unfolded: a mesh vertex that is reached by two
  * unrelated ways (tiny closed meshes) gets two columns, so that the key never depends on such coincidences.
  */
 #ifndef QP_PLAN_CONFIG_H

@@ -22,11 +22,15 @@
 
 static const double pi = 3.14159265358979323846;
 
-/* Masks over the vertex, its spokes and its diagonals: [1 + spokes + faces]. */
+/* Masks over the vertex, its spokes, its diagonals and the ends of a crease through it: [mask_size()]. */
 typedef struct masks {
     double *p, *t1, *t2;
     bool has_tangents;
 } masks;
+
+static uint32_t mask_size(const qp_fan *fan) {
+    return 1 + qp_fan_spokes(fan) + fan->faces + (fan->through ? 2 : 0);
+}
 
 /* Angles are counted from spoke `first`. */
 static void smooth_masks(uint32_t n, uint32_t first, masks *m) {
@@ -141,16 +145,20 @@ static void crease_masks(const qp_fan *fan, uint32_t begin, uint32_t faces, mask
 /* Masks of a fan without semi-sharp features. */
 static void fan_masks(const qp_corner *corner, masks *m, double *work) {
     const qp_fan *fan = corner->fan;
-    uint32_t spokes = qp_fan_spokes(fan), sharp = 0, last = 0;
+    uint32_t spokes = qp_fan_spokes(fan), sharp, last = 0;
+    qp_fan_sharp_edges(fan, &sharp);
     for (uint32_t j = 0; j < spokes; ++j) {
-        if (!qp_sharp_is_infinite(fan->sharp[j])) continue;
-        ++sharp;
-        last = j;
+        if (qp_sharp_is_infinite(fan->sharp[j])) last = j;
     }
     if (!qp_sharp_is_infinite(fan->sharpness) && sharp == 0) {
         smooth_masks(fan->faces, 0, m);
     } else if (!qp_sharp_is_infinite(fan->sharpness) && sharp == 1) {
         dart_masks(fan->faces, last, m, work);
+    } else if (!qp_sharp_is_infinite(fan->sharpness) && sharp == 2 && fan->beside) {
+        /* The fan moves with a vertex that ignores it, as at a sharp apex. */
+        m->p[0] = 2.0 / 3.0;
+        m->p[1 + spokes + fan->faces] = m->p[2 + spokes + fan->faces] = 1.0 / 6.0;
+        m->has_tangents = false;
     } else if (!qp_sharp_is_infinite(fan->sharpness) && sharp == 2) {
         /* The sector of the cell: back to the crease spoke before it, on to the one after it. */
         int back = 0, on = 1;
@@ -174,14 +182,16 @@ static void apply_mask(const qp_local *local, const qp_level *level, const qp_fa
                        double *row) {
     uint32_t width = local->width, spokes = qp_fan_spokes(fan);
     memset(row, 0, width * sizeof *row);
-    for (uint32_t i = 0; i < 1 + spokes + fan->faces; ++i) {
+    for (uint32_t i = 0; i < mask_size(fan); ++i) {
         if (mask[i] == 0.0) continue;
-        uint32_t point = i == 0        ? fan->vertex
-                         : i <= spokes ? fan->spoke[i - 1]
-                                       : fan->diagonal[i - 1 - spokes];
+        uint32_t point = i == 0                     ? fan->vertex
+                         : i <= spokes              ? fan->spoke[i - 1]
+                         : i <= spokes + fan->faces ? fan->diagonal[i - 1 - spokes]
+                                                    : fan->end[i - 1 - spokes - fan->faces];
         const double *from = qp_level_row(local, level, point);
         for (uint32_t k = 0; k < width; ++k) row[k] += mask[i] * from[k];
     }
+    if (fan->faces >= QP_SETTLE_FACES) qp_row_settle(row, width);
 }
 
 /* Tangents shrink with the level; only their direction counts, so they are brought to a largest weight of 1.
@@ -201,7 +211,7 @@ static bool has_general_face(const qp_fan *fan) {
 }
 
 double *qp_limit_mask(const qp_corner *corner) {
-    uint32_t count = 1 + qp_fan_spokes(corner->fan) + corner->fan->faces;
+    uint32_t count = mask_size(corner->fan);
     double *block = qp_alloc(4 * (size_t)count, sizeof *block, true);
     if (block == NULL) return NULL;
     masks m = {.p = block, .t1 = block + count, .t2 = block + 2 * (size_t)count};
@@ -238,7 +248,7 @@ void qp_limit_stencils(qp_local *local, const qp_level *from, const qp_corner *c
         qp_local_free(&own);
         return;
     }
-    uint32_t count = 1 + qp_fan_spokes(c.fan) + c.fan->faces;
+    uint32_t count = mask_size(c.fan);
     double *block = qp_alloc(4 * (size_t)count, sizeof *block, true);
     if (block == NULL) {
         local->failed = true;

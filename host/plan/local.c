@@ -1,5 +1,6 @@
 #include "host/plan/local.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -143,7 +144,34 @@ bool qp_sharp_is_semi(float s) {
 bool qp_fan_has_semi_sharp(const qp_fan *fan) {
     bool semi = qp_sharp_is_semi(fan->sharpness);
     for (uint32_t j = 0; j < qp_fan_spokes(fan); ++j) semi = semi || qp_sharp_is_semi(fan->sharp[j]);
+    for (uint32_t j = 0; j < fan->others; ++j) semi = semi || qp_sharp_is_semi(fan->other_sharp[j]);
     return semi;
+}
+
+/* Spoke j is one of the two edges that the vertex's crease runs along. */
+static bool is_end_spoke(const qp_fan *fan, uint32_t j) {
+    return fan->through && !fan->closed && (j == 0 || j == fan->faces);
+}
+
+/* The same with sharpnesses of another level. */
+static uint32_t count_sharp(const qp_fan *fan, const float *sharp, const float *other_sharp,
+                            uint32_t *infinite) {
+    uint32_t count = *infinite = fan->through ? 2 : 0;
+    for (uint32_t j = 0; j < qp_fan_spokes(fan); ++j) {
+        if (sharp[j] <= 0.0f || is_end_spoke(fan, j)) continue;
+        ++count;
+        *infinite += qp_sharp_is_infinite(sharp[j]);
+    }
+    for (uint32_t j = 0; j < fan->others; ++j) {
+        if (other_sharp[j] <= 0.0f) continue;
+        ++count;
+        *infinite += qp_sharp_is_infinite(other_sharp[j]);
+    }
+    return count;
+}
+
+uint32_t qp_fan_sharp_edges(const qp_fan *fan, uint32_t *infinite) {
+    return count_sharp(fan, fan->sharp, fan->other_sharp, infinite);
 }
 
 float qp_sharp_decrement(float s) {
@@ -159,19 +187,29 @@ float qp_sharp_chaikin(float s, double sum, uint32_t count) {
     return child > 0.0f ? child : 0.0f;
 }
 
-/* Sharpness of the near halves of all spokes at the next level. */
-static void child_sharpness(const qp_local *local, const float *sharp, uint32_t spokes, float *child) {
+static void add_semi_sharp(const float *sharp, uint32_t edges, double *sum, uint32_t *count) {
+    for (uint32_t j = 0; j < edges; ++j) {
+        if (!qp_sharp_is_semi(sharp[j])) continue;
+        *sum += (double)sharp[j];
+        ++*count;
+    }
+}
+
+/* Sharpness of the near halves of all spokes, and of the vertex's other sharp edges, at the next level. */
+static void child_sharpness(const qp_local *local, const qp_fan *fan, float *child, float *other_child) {
     double sum = 0.0;
     uint32_t count = 0;
     if (local->chaikin) {
-        for (uint32_t j = 0; j < spokes; ++j) {
-            if (!qp_sharp_is_semi(sharp[j])) continue;
-            sum += (double)sharp[j];
-            ++count;
-        }
+        add_semi_sharp(fan->sharp, qp_fan_spokes(fan), &sum, &count);
+        add_semi_sharp(fan->other_sharp, fan->others, &sum, &count);
     }
-    for (uint32_t j = 0; j < spokes; ++j) {
-        child[j] = local->chaikin ? qp_sharp_chaikin(sharp[j], sum, count) : qp_sharp_decrement(sharp[j]);
+    for (uint32_t j = 0; j < qp_fan_spokes(fan); ++j) {
+        const float s = fan->sharp[j];
+        child[j] = local->chaikin ? qp_sharp_chaikin(s, sum, count) : qp_sharp_decrement(s);
+    }
+    for (uint32_t j = 0; j < fan->others && other_child != NULL; ++j) {
+        const float s = fan->other_sharp[j];
+        other_child[j] = local->chaikin ? qp_sharp_chaikin(s, sum, count) : qp_sharp_decrement(s);
     }
 }
 
@@ -184,12 +222,29 @@ static void row_add(double *restrict row, const double *restrict from, double we
     for (uint32_t i = 0; i < width; ++i) row[i] += weight * from[i];
 }
 
+void qp_row_settle(double *row, uint32_t width) {
+    enum { PART = 32 };
+    double sum = 0.0;
+    uint32_t largest = 0;
+    for (uint32_t begin = 0; begin < width; begin += PART) {
+        double part = 0.0;
+        for (uint32_t i = begin; i < width && i < begin + PART; ++i) {
+            part += row[i];
+            if (fabs(row[i]) > fabs(row[largest])) largest = i;
+        }
+        sum += part;
+    }
+    row[largest] += rint(sum) - sum;
+}
+
 /* Points of the refined fan of one vertex: face and edge points, in the new level. */
 typedef struct refined_fan {
     uint32_t vertex;
     uint32_t *face; /* [faces] */
     uint32_t *edge; /* [spokes] */
     float *sharp;   /* [spokes] near halves */
+    uint32_t end[2];
+    float *other_sharp; /* [others] */
 } refined_fan;
 
 /* The face point of face j of a fan. Faces are known by a directed edge, which only one face has: the one
@@ -277,15 +332,19 @@ static uint32_t refine_edge(qp_local *local, const qp_level *from, qp_level *to,
 
 typedef enum vertex_rule { RULE_SMOOTH, RULE_CREASE, RULE_CORNER } vertex_rule;
 
-static vertex_rule rule_of(float vertex_sharpness, const float *sharp, uint32_t spokes, uint32_t ends[2]) {
-    uint32_t count = 0;
-    for (uint32_t j = 0; j < spokes; ++j) {
-        if (sharp[j] <= 0.0f) continue;
-        if (count < 2) ends[count] = j;
-        ++count;
-    }
+/* ends: the far points of a crease. */
+static vertex_rule rule_of(const qp_fan *fan, float vertex_sharpness, const float *sharp,
+                           const float *other_sharp, uint32_t ends[2]) {
+    uint32_t infinite, count = count_sharp(fan, sharp, other_sharp, &infinite);
     if (vertex_sharpness > 0.0f || count > 2) return RULE_CORNER;
-    return count == 2 ? RULE_CREASE : RULE_SMOOTH;
+    if (count < 2) return RULE_SMOOTH;
+    if (fan->through) {
+        memcpy(ends, fan->end, sizeof fan->end);
+        return RULE_CREASE;
+    }
+    for (uint32_t j = 0, end = 0; j < qp_fan_spokes(fan); ++j)
+        if (sharp[j] > 0.0f) ends[end++] = fan->spoke[j];
+    return RULE_CREASE;
 }
 
 static void add_vertex_rule(const qp_local *local, const qp_level *from, const qp_level *to,
@@ -297,8 +356,8 @@ static void add_vertex_rule(const qp_local *local, const qp_level *from, const q
         row_add(row, vertex, weight, w);
     } else if (rule == RULE_CREASE) {
         row_add(row, vertex, 0.75 * weight, w);
-        row_add(row, qp_level_row(local, from, fan->spoke[ends[0]]), 0.125 * weight, w);
-        row_add(row, qp_level_row(local, from, fan->spoke[ends[1]]), 0.125 * weight, w);
+        row_add(row, qp_level_row(local, from, ends[0]), 0.125 * weight, w);
+        row_add(row, qp_level_row(local, from, ends[1]), 0.125 * weight, w);
     } else {
         double n = fan->faces, share = weight / (n * n);
         row_add(row, vertex, weight * (n - 2.0) / n, w);
@@ -328,6 +387,14 @@ static double parent_share(const qp_local *local, const qp_fan *fan, const refin
             ++count;
         }
     }
+    for (uint32_t j = 0; j < fan->others; ++j) {
+        float s = fan->other_sharp[j];
+        bool vanishes = local->chaikin ? refined->other_sharp[j] <= 0.0f : s <= 1.0f;
+        if (s > 0.0f && vanishes) {
+            sum += (double)s;
+            ++count;
+        }
+    }
     if (count == 0) return 0.0;
     float share = (float)sum / (float)count;
     return share > 1.0f ? 1.0 : (double)share;
@@ -338,10 +405,10 @@ static uint32_t refine_vertex(qp_local *local, const qp_level *from, qp_level *t
     bool fresh;
     uint32_t point = qp_level_point(local, to, QP_KEY_VERTEX, fan->vertex, fan->vertex, &fresh);
     if (!fresh || local->failed) return point;
-    uint32_t spokes = qp_fan_spokes(fan), parent_ends[2], child_ends[2];
+    uint32_t parent_ends[2] = {0, 0}, child_ends[2] = {0, 0};
     float child_sharp = qp_sharp_decrement(fan->sharpness);
-    vertex_rule parent = rule_of(fan->sharpness, fan->sharp, spokes, parent_ends);
-    vertex_rule child = rule_of(child_sharp, refined->sharp, spokes, child_ends);
+    vertex_rule parent = rule_of(fan, fan->sharpness, fan->sharp, fan->other_sharp, parent_ends);
+    vertex_rule child = rule_of(fan, child_sharp, refined->sharp, refined->other_sharp, child_ends);
     double *row = qp_level_row(local, to, point);
     row_zero(row, local->width);
     if (parent == child || parent == RULE_SMOOTH) {
@@ -351,7 +418,27 @@ static uint32_t refine_vertex(qp_local *local, const qp_level *from, qp_level *t
         add_vertex_rule(local, from, to, fan, refined, parent, parent_ends, share, row);
         add_vertex_rule(local, from, to, fan, refined, child, child_ends, 1.0 - share, row);
     }
+    if (fan->faces >= QP_SETTLE_FACES) qp_row_settle(row, local->width);
     return point;
+}
+
+/* The far points of the crease through the vertex: edge points of its own spokes, or midpoints of edges that it lacks. */
+static void refine_ends(qp_local *local, const qp_level *from, qp_level *to, const qp_fan *fan,
+                        refined_fan *refined) {
+    for (uint32_t t = 0; t < 2; ++t) {
+        if (!fan->closed && (t == 0 || !fan->beside)) {
+            refined->end[t] = refined->edge[t == 0 ? 0 : fan->faces];
+            continue;
+        }
+        bool fresh;
+        const uint32_t a = fan->vertex, b = fan->end[t];
+        refined->end[t] = qp_level_point(local, to, QP_KEY_EDGE, a < b ? a : b, a < b ? b : a, &fresh);
+        if (!fresh || local->failed) continue;
+        double *row = qp_level_row(local, to, refined->end[t]);
+        row_zero(row, local->width);
+        row_add(row, qp_level_row(local, from, a), 0.5, local->width);
+        row_add(row, qp_level_row(local, from, b), 0.5, local->width);
+    }
 }
 
 /* ---- fans of the next level ---- */
@@ -375,16 +462,18 @@ static bool refine_points(qp_local *local, qp_level *from, qp_level *to, const q
                           refined_fan *refined) {
     uint32_t spokes = qp_fan_spokes(fan);
     refined->face = qp_arena_get(&to->arena, ((size_t)fan->faces + spokes) * sizeof(uint32_t));
-    refined->sharp = qp_arena_get(&to->arena, spokes * sizeof(float));
+    refined->sharp = qp_arena_get(&to->arena, ((size_t)spokes + fan->others) * sizeof(float));
     if (refined->face == NULL || refined->sharp == NULL) {
         local->failed = true;
         return false;
     }
     refined->edge = refined->face + fan->faces;
-    child_sharpness(local, fan->sharp, spokes, refined->sharp);
+    refined->other_sharp = refined->sharp + spokes;
+    child_sharpness(local, fan, refined->sharp, refined->other_sharp);
     for (uint32_t j = 0; j < fan->faces; ++j) refined->face[j] = refine_face(local, from, to, fan, j);
     for (uint32_t j = 0; j < spokes; ++j) refined->edge[j] = refine_edge(local, from, to, fan, j, refined);
     refined->vertex = refine_vertex(local, from, to, fan, refined);
+    if (fan->through) refine_ends(local, from, to, fan, refined);
     return !local->failed;
 }
 
@@ -399,6 +488,11 @@ static qp_fan *vertex_fan(qp_local *local, qp_level *to, const qp_fan *fan, cons
     uint32_t spokes = qp_fan_spokes(fan);
     child->vertex = refined->vertex;
     child->sharpness = qp_sharp_decrement(fan->sharpness);
+    child->through = fan->through;
+    child->beside = fan->beside;
+    child->others = fan->others;
+    child->other_sharp = refined->other_sharp; /* of the same arena */
+    memcpy(child->end, refined->end, sizeof child->end);
     memcpy(child->spoke, refined->edge, spokes * sizeof *child->spoke);
     memcpy(child->diagonal, refined->face, fan->faces * sizeof *child->diagonal);
     memcpy(child->sharp, refined->sharp, spokes * sizeof *child->sharp);
@@ -441,9 +535,9 @@ static qp_fan *edge_fan(qp_local *local, qp_level *to, const qp_cell *cell, cons
         local->failed = true;
         return NULL;
     }
-    child_sharpness(local, vertex_fans[next]->sharp, qp_fan_spokes(b->fan), around);
+    child_sharpness(local, vertex_fans[next], around, NULL);
     fan->far_sharp[0] = around[spoke_b];
-    child_sharpness(local, vertex_fans[i]->sharp, qp_fan_spokes(a->fan), around);
+    child_sharpness(local, vertex_fans[i], around, NULL);
     fan->far_sharp[2] = around[spoke_a];
     fan->far_sharp[1] = 0.0f;
     fan->diagonal[0] = refined[next].edge[qp_corner_spoke(b, 0)];

@@ -5,7 +5,8 @@
  * j lies between spoke j and spoke j+1; a closed fan (interior vertex) has m spokes and wraps, an open one
  * has m+1. The limit surface over a cell depends on the fans of its corners and on nothing else, and so do
  * the fans of its children: the recursion below is closed. Non-manifold edges cut fans, so a fan is always a
- * disk or a half disk.
+ * disk or a half disk. A vertex may still lie smoothly on a crease of two of them (*through*, as OpenSubdiv has it): its rule then
+ * is that of all its fans together.
  *
  * Subdivision rules: Catmull and Clark 1978, with semi-sharp creases of DeRose, Kass and Truong 1998 as
  * OpenSubdiv's Sdc applies them. Sharpness is float arithmetic, as there. */
@@ -24,6 +25,12 @@ typedef struct qp_fan {
     float *far_sharp;   /* [spokes] sharpness that the far half of the spoke gets at the next level */
     uint32_t *diagonal; /* [m] the fourth point of quad j; QP_NONE where the face is no quad (level 0 only) */
     uint32_t *face;     /* [m] index into qp_local.faces at level 0; NULL above */
+    /* The vertex lies on a crease of two non-manifold edges and is no corner for ever. An open fan starts at end 0 and ends at
+     * end 1, or else lies `beside` the crease, as closed ones do: its own edges tell less than these. */
+    bool through, beside;
+    uint32_t end[2];    /* far points of the two edges */
+    uint32_t others;    /* sharp edges of the vertex in its other fans, those two apart */
+    float *other_sharp; /* [others] */
 } qp_fan;
 
 static inline uint32_t qp_fan_spokes(const qp_fan *f) {
@@ -106,6 +113,11 @@ static inline double *qp_level_row(const qp_local *local, const qp_level *level,
     return level->rows + (size_t)point * local->width;
 }
 
+/* From this valence on, sums over a fan add up rounding errors that are all of one sign; qp_row_settle gives what a row's sum then
+ * lacks of 1 or 0 to its largest weight. */
+enum { QP_SETTLE_FACES = 32 };
+void qp_row_settle(double *row, uint32_t width);
+
 /* Refines a cell of level `from` into `to`: writes the rows of every point of its children's fans and returns
  * the children (cell->n of them; child i lies at corner i and keeps the cell's orientation when n is 4; an
  * n-gon's child has its corner 0 at corner i). Sets local->failed when memory is out. */
@@ -136,5 +148,7 @@ float qp_sharp_decrement(float s);
 float qp_sharp_chaikin(float s, double sum, uint32_t count);
 /* Some spoke or the vertex is semi-sharp, so that the rules here change with the level. */
 bool qp_fan_has_semi_sharp(const qp_fan *fan);
+/* Sharp edges at the vertex, and how many of them are infinitely sharp. */
+uint32_t qp_fan_sharp_edges(const qp_fan *fan, uint32_t *infinite);
 
 #endif

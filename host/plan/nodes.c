@@ -4,16 +4,6 @@
 #include <math.h>
 #include <string.h>
 
-static uint32_t sharp_spokes(const qp_fan *fan, uint32_t *infinite) {
-    uint32_t count = 0;
-    *infinite = 0;
-    for (uint32_t j = 0; j < qp_fan_spokes(fan); ++j) {
-        if (fan->sharp[j] > 0.0f) ++count;
-        if (qp_sharp_is_infinite(fan->sharp[j])) ++*infinite;
-    }
-    return count;
-}
-
 static bool is_quad(const qp_corner *corner, int step) {
     uint32_t j = qp_corner_face(corner, step);
     return j != QP_NONE && corner->fan->diagonal[j] != QP_NONE;
@@ -23,7 +13,7 @@ static bool smooth_four(const qp_corner *c) {
     const qp_fan *fan = c->fan;
     if (!fan->closed || fan->faces != 4 || fan->sharpness > 0.0f) return false;
     uint32_t infinite;
-    return sharp_spokes(fan, &infinite) == 0 && is_quad(c, 0) && is_quad(c, 1) && is_quad(c, 2) &&
+    return qp_fan_sharp_edges(fan, &infinite) == 0 && is_quad(c, 0) && is_quad(c, 1) && is_quad(c, 2) &&
            is_quad(c, 3);
 }
 
@@ -34,9 +24,9 @@ static bool corner_is_regular(const qp_corner *c) {
     float s0 = qp_corner_sharp(c, 0), s1 = qp_corner_sharp(c, 1);
     if (qp_sharp_is_semi(s0) || qp_sharp_is_semi(s1)) return false;
     if (s0 <= 0.0f && s1 <= 0.0f) return smooth_four(c);
-    uint32_t infinite, sharp = sharp_spokes(c->fan, &infinite);
+    uint32_t infinite, sharp = qp_fan_sharp_edges(c->fan, &infinite);
     if (s0 > 0.0f && s1 > 0.0f) return qp_sharp_is_infinite(c->fan->sharpness) || infinite >= 3;
-    if (c->fan->sharpness > 0.0f || sharp != 2 || infinite != 2) return false;
+    if (c->fan->sharpness > 0.0f || sharp != 2 || infinite != 2 || c->fan->beside) return false;
     /* The second sharp edge must bound the next face over. */
     int other = s0 > 0.0f ? 2 : -1, neighbour = s0 > 0.0f ? 1 : -1;
     return qp_sharp_is_infinite(qp_corner_sharp(c, other)) && is_quad(c, neighbour);
@@ -58,7 +48,7 @@ static bool crease_goes_on(const qp_corner *c, int step, float s) {
     uint32_t infinite;
     /* Chaikin: its far half must decay as the near one does, or the crease is not constant. */
     bool constant = fan->far_sharp[qp_corner_spoke(c, step + 2)] == qp_sharp_decrement(s);
-    return constant && sharp_spokes(fan, &infinite) == 2 && qp_corner_sharp(c, step) == s &&
+    return constant && qp_fan_sharp_edges(fan, &infinite) == 2 && qp_corner_sharp(c, step) == s &&
            qp_corner_sharp(c, step + 2) == s && is_quad(c, 0) && is_quad(c, 1) && is_quad(c, 2) &&
            is_quad(c, 3);
 }

@@ -29,7 +29,10 @@ static bool corner_is_regular(const cell *c, uint32_t j) {
     uint32_t other = qp_piece_across(m, c->corner[j], smooth);
     if (other == QP_NONE) return false;
     uint32_t next = m->corner_edge[other], prev = m->corner_edge[qp_piece_prev(m, other)];
-    return qp_piece_infinite(m->edges[next == smooth ? prev : next].sharpness);
+    uint32_t far = next == smooth ? prev : next;
+    /* Two faces may also stand on one non-manifold edge like the pages of an open book: that is no crease of theirs. */
+    uint32_t near = m->corner_edge[after ? c->corner[j] : qp_piece_prev(m, c->corner[j])];
+    return far != near && qp_piece_infinite(m->edges[far].sharpness);
 }
 
 static void extrapolate(const qp_quad at[3], const qp_quad inside[3], qp_quad outside[3]) {
