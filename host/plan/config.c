@@ -141,14 +141,25 @@ static int compare_floats(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
-/* Sharpness of the sharp edges in the vertex's other fans, increasing; none of them is a boundary, and each has two faces there, so
- * that one of its corners at the vertex begins with it. Their number; others may be NULL. */
+/* The other fans of the vertex have a say: in its rule, or, by Chaikin's rule, in how the semi-sharp edges of this one decay. */
+static bool has_others(const qp_gather *g, const qp_mesh *mesh, uint32_t i) {
+    const uint32_t vertex = mesh->face_vertices[fan_corner(g, i, 0)];
+    if (!(mesh->vertex_flags[vertex] & QP_VERTEX_NONMANIFOLD)) return false;
+    if (is_through(g, mesh, i)) return true;
+    uint32_t far;
+    for (uint32_t j = 0; j < fan_spokes(g, i) && mesh->crease_method == QP_CREASE_CHAIKIN; ++j)
+        if (qp_sharp_is_semi(mesh->edge_sharpness[spoke_edge(g, mesh, i, j, &far)])) return true;
+    return false;
+}
+
+/* Sharpness of the sharp edges in the vertex's other fans, increasing, without boundaries and non-manifold edges: each has two faces
+ * there, so that one of its corners at the vertex begins with it. Their number; others may be NULL. */
 static uint32_t other_edges(const qp_gather *g, const qp_mesh *mesh, uint32_t i, float *others) {
     const uint32_t vertex = mesh->face_vertices[fan_corner(g, i, 0)];
     uint32_t count = 0;
     for (uint32_t k = mesh->vertex_offsets[vertex]; k < mesh->vertex_offsets[vertex + 1]; ++k) {
         const uint32_t edge = mesh->corner_edge[mesh->vertex_corners[k]];
-        if (mesh->edge_sharpness[edge] <= 0.0f || (mesh->edge_flags[edge] & QP_EDGE_NONMANIFOLD)) continue;
+        if (mesh->edge_sharpness[edge] <= 0.0f || mesh->edge_flags[edge] != 0) continue;
         if (fan_has_edge(g, mesh, i, edge)) continue;
         if (others != NULL) others[count] = mesh->edge_sharpness[edge];
         ++count;
@@ -169,8 +180,8 @@ static float spoke_far_sharpness(const qp_gather *g, const qp_mesh *mesh, uint32
     return far_sharpness(mesh, far, edge);
 }
 
-/* What the other fans of a through vertex add to its key. */
-static bool push_through_words(qp_gather *g, const qp_mesh *mesh, uint32_t i) {
+/* What the other fans of a vertex add to the key. */
+static bool push_other_words(qp_gather *g, const qp_mesh *mesh, uint32_t i) {
     uint32_t edges[2] = {QP_NONE, QP_NONE};
     const uint32_t others = other_edges(g, mesh, i, NULL);
     size_t count = g->word_begin[i + 1];
@@ -183,7 +194,9 @@ static bool push_through_words(qp_gather *g, const qp_mesh *mesh, uint32_t i) {
     other_edges(g, mesh, i, sharp);
     /* The corner's first word is at most 2^30 otherwise. */
     g->words[g->word_begin[i]] |= 0x80000000u;
-    g->words[count++] = others << 1 | (find_ends(g, mesh, i, edges) ? 1u : 0u);
+    const bool through = is_through(g, mesh, i);
+    g->words[count++] =
+        others << 2 | (through ? 2u : 0u) | (through && find_ends(g, mesh, i, edges) ? 1u : 0u);
     for (uint32_t j = 0; j < others; ++j) {
         g->words[count++] = float_bits(sharp[j]);
         if (qp_sharp_is_semi(sharp[j])) g->has_semi = true;
@@ -216,7 +229,7 @@ static bool push_corner_words(qp_gather *g, const qp_mesh *mesh, uint32_t i) {
         if (mesh->crease_method == QP_CREASE_CHAIKIN) w[count++] = float_bits(far_sharpness(mesh, far, edge));
     }
     g->word_begin[i + 1] = (uint32_t)count;
-    return !is_through(g, mesh, i) || push_through_words(g, mesh, i);
+    return !has_others(g, mesh, i) || push_other_words(g, mesh, i);
 }
 
 bool qp_gather_face(qp_gather *g, const qp_mesh *mesh, uint32_t face) {
@@ -421,12 +434,14 @@ static uint32_t entry_column(qp_gather *g, uint32_t e) {
     return g->column[find_root(g->parent, e)];
 }
 
-static bool fill_through(qp_gather *g, const qp_mesh *mesh, uint32_t i, qp_arena *arena, qp_fan *fan) {
+static bool fill_others(qp_gather *g, const qp_mesh *mesh, uint32_t i, qp_arena *arena, qp_fan *fan) {
     uint32_t edges[2] = {QP_NONE, QP_NONE};
-    fan->through = true;
-    fan->beside = find_ends(g, mesh, i, edges);
-    fan->end[0] = fan->closed ? entry_column(g, end_entry(g, i, 0)) : fan->spoke[0];
-    fan->end[1] = fan->beside ? entry_column(g, end_entry(g, i, 1)) : fan->spoke[fan->faces];
+    fan->through = is_through(g, mesh, i);
+    if (fan->through) {
+        fan->beside = find_ends(g, mesh, i, edges);
+        fan->end[0] = fan->closed ? entry_column(g, end_entry(g, i, 0)) : fan->spoke[0];
+        fan->end[1] = fan->beside ? entry_column(g, end_entry(g, i, 1)) : fan->spoke[fan->faces];
+    }
     fan->others = other_edges(g, mesh, i, NULL);
     fan->other_sharp = qp_arena_get(arena, fan->others * sizeof *fan->other_sharp);
     if (fan->other_sharp == NULL) return false;
@@ -466,7 +481,7 @@ static bool fill_fan(qp_gather *g, const qp_mesh *mesh, uint32_t i, uint32_t fir
         fan->far_sharp[j] =
             local->chaikin ? spoke_far_sharpness(g, mesh, i, j) : qp_sharp_decrement(fan->sharp[j]);
     }
-    return !is_through(g, mesh, i) || fill_through(g, mesh, i, arena, fan);
+    return !has_others(g, mesh, i) || fill_others(g, mesh, i, arena, fan);
 }
 
 qp_cell *qp_gather_cell(qp_gather *g, const qp_mesh *mesh, uint32_t start, qp_local *local) {

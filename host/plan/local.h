@@ -29,7 +29,7 @@ typedef struct qp_fan {
      * end 1, or else lies `beside` the crease, as closed ones do: its own edges tell less than these. */
     bool through, beside;
     uint32_t end[2];    /* far points of the two edges */
-    uint32_t others;    /* sharp edges of the vertex in its other fans, those two apart */
+    uint32_t others;    /* sharp edges of the vertex in its other fans, those two apart; counted where they have a say */
     float *other_sharp; /* [others] */
 } qp_fan;
 
