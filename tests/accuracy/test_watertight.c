@@ -167,7 +167,7 @@ static void check_unmatched(const qp_mesh *mesh, const qp_surface *surface, qp_p
 static void check_random(unsigned seed) {
     qp_error err = {0};
     qp_mesh *mesh = NULL, *other = NULL;
-    const qp_generate_options options = {.seed = seed, .sharpness = -1.0, .faces = full ? 200 : 50};
+    const qp_generate_options options = {.seed = seed, .sharpness = -1.0, .faces = full ? 200 : 30};
     if (!CHECK_OK(qp_mesh_generate(seed % 2 == 0 ? "random-closed" : "random-open", &options, &mesh, &err),
                   err))
         return;
