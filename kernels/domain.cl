@@ -297,9 +297,9 @@ QP_FUNCTION void QP_NAME(replace_normal)(__global const uint *tree, __global con
         *flag &= (uchar)~QP_FLAG_NO_NORMAL;
     else
         n = QP_NAME(stand_in_normal)(middle, size);
-    normal[0] = n.x;
-    normal[1] = n.y;
-    normal[2] = n.z;
+    normal[0] = n.x + QP_R(0.0);
+    normal[1] = n.y + QP_R(0.0);
+    normal[2] = n.z + QP_R(0.0);
 }
 
 __kernel void QP_NAME(domain)(__global const uint *heads, __global const uint *trees,

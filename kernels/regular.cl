@@ -37,9 +37,9 @@ QP_FUNCTION void QP_NAME(replace_regular_normal)(real point[3][16], real u, real
         QP_NAME(eval_points)(point, QP_R(0.5), QP_R(0.5), 0u, 0u, &middle);
         n = QP_NAME(stand_in_normal)(middle, size);
     }
-    normal[0] = n.x;
-    normal[1] = n.y;
-    normal[2] = n.z;
+    normal[0] = n.x + QP_R(0.0);
+    normal[1] = n.y + QP_R(0.0);
+    normal[2] = n.z + QP_R(0.0);
 }
 
 __kernel void QP_NAME(regular)(__global const uint *rings, __global const real *positions,
