@@ -13,6 +13,10 @@ static void put_real(const qp_frame *frame, void *reals, size_t i, double x) {
         ((double *)reals)[i] = x;
 }
 
+static bool has_tolerance(const qp_tessellation *t) {
+    return t->patch_factors == NULL && t->edge_factors == NULL && t->tolerance != 0;
+}
+
 qp_status qp_frame_update_positions(qp_frame *frame, qp_error *err) {
     const qp_mesh *mesh = frame->surface->mesh;
     const size_t count = 3 * (size_t)mesh->n_vertices, reals = QP_POSITION_FIRST + count;
@@ -31,6 +35,7 @@ qp_status qp_frame_update_positions(qp_frame *frame, qp_error *err) {
                  ldexp(mesh->positions[i] - f.centre[i % 3], -f.exponent));
     qp_status status = qp_frame_upload(frame, &frame->positions, local, reals * frame->real_size, "positions", err);
     free(local);
+    if (has_tolerance(&frame->tessellation)) frame->tessellated = false;
     return status;
 }
 
@@ -217,7 +222,7 @@ static bool same_tessellation(const qp_frame *frame, const qp_tessellation *t) {
     if (t->edge_factors != NULL)
         return memcmp(t->edge_factors, frame->edge_factors, sizeof(float) * frame->surface->mesh->n_edges) ==
                0;
-    return t->factor == frame->tessellation.factor;
+    return t->factor == frame->tessellation.factor && t->tolerance == frame->tessellation.tolerance;
 }
 
 /* A copy of n factors in *copy, in place of what it was; NULL of NULL. */
@@ -231,6 +236,15 @@ static qp_status keep_factors(float **copy, const float *factors, size_t n, qp_e
     return QP_OK;
 }
 
+/* The factors of a tolerance in *edges, malloced. */
+static qp_status factors_within(qp_frame *frame, const qp_tessellation *tessellation, float **edges, qp_error *err) {
+    const size_t n_edges = frame->surface->mesh->n_edges;
+    *edges = qp_alloc(n_edges, sizeof **edges, false);
+    if (*edges == NULL) return qp_fail_memory(err, n_edges * sizeof **edges, "tessellation factors");
+    return qp_tolerance_factors(frame->surface, tessellation, frame->options.precision, *edges, &frame->tolerance,
+                                err);
+}
+
 static qp_status set_up(qp_frame *frame, const qp_tessellation *tessellation, qp_error *err) {
     const qp_mesh *mesh = frame->surface->mesh;
     qp_frame_drop_layout(frame);
@@ -241,8 +255,18 @@ static qp_status set_up(qp_frame *frame, const qp_tessellation *tessellation, qp
     frame->tessellation = *tessellation;
     frame->tessellation.patch_factors = frame->patch_factors;
     frame->tessellation.edge_factors = frame->edge_factors;
-    qp_status status = qp_layout_tessellate(frame->surface, tessellation, frame->share,
-                                            frame->options.want_triangles, &frame->layout, err);
+    qp_tessellation chosen = *tessellation;
+    float *edges = NULL;
+    qp_status status = QP_OK;
+    frame->tolerance = (qp_tolerance_report){0};
+    if (has_tolerance(tessellation)) {
+        status = factors_within(frame, tessellation, &edges, err);
+        chosen.edge_factors = edges;
+    }
+    if (status == QP_OK)
+        status = qp_layout_tessellate(frame->surface, &chosen, frame->share, frame->options.want_triangles,
+                                      &frame->layout, err);
+    free(edges);
     if (status == QP_OK) status = qp_frame_deepen(frame, err);
     if (status == QP_OK) status = qp_frame_upload_layout(frame, err);
     if (status == QP_OK)
@@ -259,7 +283,14 @@ qp_status qp_frame_eval(qp_frame *frame, const qp_tessellation *tessellation, qp
         qp_status status = set_up(frame, tessellation, err);
         if (status != QP_OK) return status;
     }
-    return evaluate(frame, stream, err);
+    qp_status status = evaluate(frame, stream, err);
+    if (status != QP_OK) return status;
+    stream->bound = frame->tolerance.bound;
+    stream->over_tolerance = frame->tolerance.over;
+    stream->factor_min = frame->tolerance.factor_min;
+    stream->factor_mean = frame->tolerance.factor_mean;
+    stream->factor_max = frame->tolerance.factor_max;
+    return QP_OK;
 }
 
 qp_status qp_frame_eval_points(qp_frame *frame, uint64_t count, const uint32_t *patch, const double *uv,

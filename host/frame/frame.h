@@ -4,6 +4,7 @@
 
 #include "host/device/device.h"
 #include "host/frame/share.h"
+#include "host/frame/tolerance.h"
 #include "host/plan/plan.h"
 
 #include <float.h>
@@ -78,7 +79,8 @@ struct qp_frame {
     bool tessellated; /* layout is of the tessellation below, and everything is uploaded */
     qp_tessellation tessellation;
     float *patch_factors; /* copy, or NULL */
-    float *edge_factors;  /* likewise */
+    float *edge_factors;  /* likewise; not those from a tolerance */
+    qp_tolerance_report tolerance; /* of the tessellation, where it has a tolerance */
     qp_share *share;      /* NULL with no_sharing */
     size_t n_batches;
     qp_frame_batch *batches;
