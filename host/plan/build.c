@@ -11,8 +11,10 @@ void qp_builder_free(qp_builder *b) {
     free(b->tree);
     free(b->constants);
     free(b->chains);
+    free(b->corner_rows);
     for (int i = 0; i < 2; ++i) {
-        free(b->final_of[i]);
+        free(b->absolute[i].of);
+        free(b->offsets[i].of);
         free(b->items[i]);
     }
     *b = (qp_builder){0};
@@ -50,6 +52,19 @@ void qp_plan_put_point(uint32_t *words, uint32_t slot, uint32_t point) {
     words[slot / 2] |= point << (slot % 2 * 16);
 }
 
+/* The limit of a patch's corner close to the leaf, at most 4 of its sizes away, for its points to be stored as offsets from: as
+ * they are they would lose a digit of their differences, and so of derivatives, every few levels. */
+static uint32_t leaf_origin(qp_builder *b, uint32_t level, const qp_item *item) {
+    if (level - b->base <= QP_PLAN_SHARED_LEVELS) return QP_NO_POINT;
+    const uint64_t reach = 4 * (QP_PLAN_ONE >> (level - b->base));
+    for (uint32_t i = 0; i < 4; ++i) {
+        const uint64_t u = qp_plan_corner_high_u(i) ? QP_PLAN_ONE - item->u.lo : item->u.hi;
+        const uint64_t v = qp_plan_corner_high_v(i) ? QP_PLAN_ONE - item->v.lo : item->v.hi;
+        if (u <= reach && v <= reach) return qp_plan_corner_origin(b, i);
+    }
+    return QP_NO_POINT;
+}
+
 static void put_leaf(qp_builder *b, uint32_t level, const qp_item *item, int crease) {
     uint32_t rotation = crease < 0 ? 0 : (uint32_t)crease, ids[16];
     qp_level *points = &b->local.level[level & 1];
@@ -57,10 +72,13 @@ static void put_leaf(qp_builder *b, uint32_t level, const qp_item *item, int cre
     uint32_t node = qp_plan_new_node(b, crease < 0 ? 10 : 11);
     if (b->failed || b->local.failed) return;
     b->tree[node] = (crease < 0 ? QP_NODE_REGULAR : QP_NODE_CREASE) | rotation << 3;
-    b->tree[node + 1] = QP_NO_POINT;
     uint8_t need = qp_plan_cell_need(item->u, item->v);
+    const uint32_t origin = leaf_origin(b, level, item);
+    if (b->failed || b->too_large) return;
+    b->tree[node + 1] = origin;
     for (uint32_t k = 0; k < 16; ++k) {
-        uint32_t final = qp_plan_shared_final(b, level, ids[k], need);
+        uint32_t final = origin == QP_NO_POINT ? qp_plan_shared_final(b, level, ids[k], need)
+                                               : qp_plan_offset_final(b, level, ids[k], need, origin);
         if (b->failed || b->too_large) return;
         qp_plan_put_point(b->tree + node + 2, k, final);
     }
@@ -164,6 +182,28 @@ static void place_item(qp_builder *b, uint32_t level, qp_item *item) {
     }
 }
 
+/* Limits of the patch's corners around which leaves may lie deep in the tree, outside terminal nodes with a limit of their own: the
+ * semi-sharp ones, and all where there are no terminal nodes. */
+static bool find_corners(qp_builder *b, const qp_cell *cell) {
+    const uint32_t width = b->local.width;
+    for (uint32_t i = 0; i < 4; ++i) {
+        const qp_corner *corner = &cell->corner[i % cell->n];
+        b->corner_final[i] = QP_NONE;
+        b->corner_known[i] =
+            b->depth > QP_PLAN_SHARED_LEVELS && (!b->terminal_nodes || qp_fan_has_semi_sharp(corner->fan));
+        if (!b->corner_known[i]) continue;
+        void *rows = b->corner_rows;
+        bool tangents;
+        /* Room for the tangents that come along. */
+        if (!qp_grow(&rows, &b->corner_capacity, 6 * (size_t)width, sizeof(double))) return false;
+        b->corner_rows = rows;
+        qp_limit_stencils(&b->local, &b->local.level[b->base & 1], corner, b->corner_rows + i * (size_t)width,
+                          &tangents);
+        if (b->local.failed) return false;
+    }
+    return true;
+}
+
 /* The root item: the quad itself, or the first child of an n-gon after one subdivision. */
 static bool start(qp_builder *b, const qp_cell *cell, bool child, qp_item *root) {
     qp_local *local = &b->local;
@@ -184,13 +224,13 @@ static bool start(qp_builder *b, const qp_cell *cell, bool child, qp_item *root)
         root->cell = qp_refine_cell(local, &local->level[0], &local->level[1], cell);
         b->base = 1;
     }
-    return root->cell != NULL;
+    return root->cell != NULL && find_corners(b, root->cell);
 }
 
 qp_plan *qp_build_plan(qp_builder *b, const qp_cell *cell, bool child) {
     b->point_count = b->tree_words = b->node_count = b->constant_count = b->chain_count = b->flags = 0;
     b->item_count[0] = b->item_count[1] = 0;
-    b->final_size[0] = b->final_size[1] = 0;
+    for (int i = 0; i < 2; ++i) b->absolute[i].size = b->offsets[i].size = 0;
     b->too_large = b->failed = false;
     qp_item root;
     if (!start(b, cell, child, &root)) {
@@ -203,7 +243,7 @@ qp_plan *qp_build_plan(qp_builder *b, const qp_cell *cell, bool child) {
         if (level > 0) {
             /* The other level held the parents; nothing refers to them any more. */
             qp_level_clear(&b->local.level[side ^ 1]);
-            b->final_size[side ^ 1] = 0;
+            b->absolute[side ^ 1].size = b->offsets[side ^ 1].size = 0;
         }
         for (uint32_t i = 0; i < b->item_count[side]; ++i) {
             qp_item item = b->items[side][i];

@@ -9,6 +9,13 @@
 /* What a point is; kept beside the plan for `info`, which tells distinct points of a mesh apart. */
 enum { QP_POINT_REFINED, QP_POINT_LIMIT, QP_POINT_TANGENT };
 
+/* Final points of the points of a level, QP_NONE where there is none yet. */
+typedef struct qp_final_table {
+    uint32_t *of;
+    size_t capacity;
+    uint32_t size;
+} qp_final_table;
+
 /* Scratch of one worker, reused from plan to plan. Zero-initialise. */
 typedef struct qp_builder {
     qp_local local;
@@ -21,9 +28,11 @@ typedef struct qp_builder {
     struct qp_final_point *points;
     size_t point_capacity;
     uint32_t point_count;
-    uint32_t *final_of[2]; /* final point of a point of level k & 1, or QP_NONE */
-    size_t final_capacity[2];
-    uint32_t final_size[2];
+    qp_final_table absolute[2], offsets[2]; /* of level k & 1 */
+    double *corner_rows;                    /* [4 * width] limits of the patch's corners that are known */
+    size_t corner_capacity;
+    bool corner_known[4];
+    uint32_t corner_final[4]; /* those as final points, or QP_NONE */
     uint32_t *tree;
     size_t tree_capacity;
     uint32_t tree_words, node_count;

@@ -62,6 +62,10 @@ uint32_t qp_plan_copy_final(qp_builder *b, const qp_local *local, uint32_t level
                             uint8_t need);
 /* The final point of a point of a level of b->local, shared by all nodes of that level. */
 uint32_t qp_plan_shared_final(qp_builder *b, uint32_t level, uint32_t point, uint8_t need);
+/* Likewise as an offset from the final point `origin`. */
+uint32_t qp_plan_offset_final(qp_builder *b, uint32_t level, uint32_t point, uint8_t need, uint32_t origin);
+/* The limit of the patch's corner i as a final point, or QP_NO_POINT where it is not known. */
+uint32_t qp_plan_corner_origin(qp_builder *b, uint32_t i);
 /* Limit position and tangents of a cell's corner as three new points; tangents may be QP_NO_POINT. */
 void qp_plan_limit_finals(qp_builder *b, uint32_t level, const qp_corner *corner, uint8_t need,
                           uint32_t out[3]);

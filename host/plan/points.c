@@ -82,24 +82,58 @@ uint32_t qp_plan_copy_final(qp_builder *b, const qp_local *local, uint32_t level
     return final;
 }
 
+/* Where a table holds the final point of a point of a level; NULL when memory is out. */
+static uint32_t *find_final(qp_builder *b, qp_final_table *table, uint32_t level, uint32_t point) {
+    if (point >= table->size) {
+        uint32_t size = b->local.level[level & 1].count;
+        table->of = qp_plan_grown(b, table->of, &table->capacity, size, sizeof(uint32_t));
+        if (b->failed) return NULL;
+        for (uint32_t i = table->size; i < size; ++i) table->of[i] = QP_NONE;
+        table->size = size;
+    }
+    return &table->of[point];
+}
+
 /* The final point of a point of a level, shared by all nodes of that level that are not terminal. */
 uint32_t qp_plan_shared_final(qp_builder *b, uint32_t level, uint32_t point, uint8_t need) {
-    uint32_t side = level & 1;
-    if (point >= b->final_size[side]) {
-        uint32_t size = b->local.level[side].count;
-        b->final_of[side] =
-            qp_plan_grown(b, b->final_of[side], &b->final_capacity[side], size, sizeof(uint32_t));
-        if (b->failed) return 0;
-        for (uint32_t i = b->final_size[side]; i < size; ++i) b->final_of[side][i] = QP_NONE;
-        b->final_size[side] = size;
-    }
-    uint32_t final = b->final_of[side][point];
-    if (final == QP_NONE) {
-        final = b->final_of[side][point] = qp_plan_copy_final(b, &b->local, level, point, need);
+    uint32_t *final = find_final(b, &b->absolute[level & 1], level, point);
+    if (final == NULL) return 0;
+    if (*final == QP_NONE) {
+        *final = qp_plan_copy_final(b, &b->local, level, point, need);
     } else {
-        qp_plan_lower_need(b, final, need);
+        qp_plan_lower_need(b, *final, need);
     }
-    return final;
+    return *final;
+}
+
+uint32_t qp_plan_offset_final(qp_builder *b, uint32_t level, uint32_t point, uint8_t need, uint32_t origin) {
+    uint32_t *final = find_final(b, &b->offsets[level & 1], level, point);
+    if (final == NULL) return 0;
+    qp_plan_lower_need(b, origin, need);
+    if (*final != QP_NONE && b->points[*final].origin == origin) {
+        qp_plan_lower_need(b, *final, need);
+        return *final;
+    }
+    const uint32_t made = qp_plan_copy_final(b, &b->local, level, point, need);
+    if (b->failed || b->too_large) return 0;
+    double *row = qp_plan_final_row(b, made);
+    const double *from = qp_plan_final_row(b, origin);
+    for (uint32_t w = 0; w < b->local.width; ++w) row[w] -= from[w];
+    b->points[made].origin = (uint16_t)origin;
+    if (*final == QP_NONE) *final = made;
+    return made;
+}
+
+uint32_t qp_plan_corner_origin(qp_builder *b, uint32_t i) {
+    if (!b->corner_known[i]) return QP_NO_POINT;
+    if (b->corner_final[i] != QP_NONE) return b->corner_final[i];
+    const uint8_t need = qp_plan_point_need(qp_plan_corner_high_u(i) ? QP_PLAN_ONE : 0,
+                                            qp_plan_corner_high_v(i) ? QP_PLAN_ONE : 0);
+    const uint32_t final = qp_plan_new_final(b, need, QP_POINT_LIMIT | b->base << 2);
+    if (b->failed || b->too_large) return QP_NO_POINT;
+    memcpy(qp_plan_final_row(b, final), b->corner_rows + (size_t)i * b->local.width,
+           b->local.width * sizeof(double));
+    return b->corner_final[i] = final;
 }
 
 /* Limit position and tangents of a cell's corner as three new points; tangents may be QP_NO_POINT. */

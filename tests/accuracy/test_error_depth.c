@@ -75,7 +75,8 @@ static void check_mesh(const char *name, const qp_mesh *mesh, const qp_surface_o
     qp_surface *surface = NULL;
     if (!CHECK_OK(qp_surface_create(mesh, options, &surface, &err), err)) return;
     for (int precision = 0; precision < 2; ++precision) {
-        const qp_tessellation tiny = {.spacing = QP_FRACTIONAL_ODD, .factor = 5.001f};
+        const qp_tessellation tiny = {.spacing = QP_FRACTIONAL_ODD,
+                                      .factor = options->depth == 10 ? 1.001f : 5.001f};
         qp_error_report r = {0};
         if (measure(surface, device, (qp_precision)precision, "corner", NULL, 0, 0, &r))
             judge(name, "corner", options->depth, (qp_precision)precision, true, &r);
