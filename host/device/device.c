@@ -7,11 +7,10 @@
 #include <string.h>
 #include <unistd.h>
 
-typedef struct found_device {
-    qp_device_info info;
+typedef struct device_handle {
     cl_platform_id platform;
     cl_device_id id;
-} found_device;
+} device_handle;
 
 static void device_text(cl_device_id id, cl_device_info what, char *text, size_t size) {
     if (clGetDeviceInfo(id, what, size, text, NULL) != CL_SUCCESS) snprintf(text, size, "?");
@@ -22,13 +21,12 @@ static void device_text(cl_device_id id, cl_device_info what, char *text, size_t
 }
 
 static void describe_device(cl_platform_id platform, uint32_t p, cl_device_id id, uint32_t d,
-                            found_device *found) {
-    qp_device_info *info = &found->info;
+                            qp_device_info *info) {
     cl_device_fp_config single = 0, doubles = 0;
     cl_device_type type = 0;
     cl_uint units = 0;
     cl_ulong memory = 0, largest = 0;
-    *found = (found_device){.platform = platform, .id = id};
+    *info = (qp_device_info){0};
     snprintf(info->id, sizeof info->id, "%u.%u", p, d);
     device_text(id, CL_DEVICE_NAME, info->name, sizeof info->name);
     device_text(id, CL_DEVICE_VERSION, info->version, sizeof info->version);
@@ -62,45 +60,46 @@ static void describe_host(qp_device_info *info) {
     info->max_buffer_bytes = SIZE_MAX / 2;
 }
 
-/* Every OpenCL device in platform order; a system without OpenCL has none. */
-static qp_status find_devices(found_device **list, size_t *count, qp_error *err) {
+/* Every OpenCL device in platform order, with room for one more in *list; a system without OpenCL has none. */
+static qp_status find_devices(qp_device_info **list, device_handle **handles, size_t *count, qp_error *err) {
     cl_platform_id platforms[64];
     cl_uint n_platforms = 0;
-    size_t capacity = 0;
+    size_t list_capacity = 0, handle_capacity = 0;
     *list = NULL;
+    *handles = NULL;
     *count = 0;
-    if (clGetPlatformIDs(64, platforms, &n_platforms) != CL_SUCCESS) return QP_OK;
+    if (clGetPlatformIDs(64, platforms, &n_platforms) != CL_SUCCESS) n_platforms = 0;
     if (n_platforms > 64) n_platforms = 64;
-    for (cl_uint p = 0; p < n_platforms; ++p) {
+    for (cl_uint p = 0; p <= n_platforms; ++p) {
         cl_device_id devices[64];
         cl_uint n_devices = 0;
-        if (clGetDeviceIDs(platforms[p], CL_DEVICE_TYPE_ALL, 64, devices, &n_devices) != CL_SUCCESS) continue;
+        if (p < n_platforms &&
+            clGetDeviceIDs(platforms[p], CL_DEVICE_TYPE_ALL, 64, devices, &n_devices) != CL_SUCCESS)
+            continue;
         if (n_devices > 64) n_devices = 64;
-        if (!qp_grow((void **)list, &capacity, *count + n_devices, sizeof **list)) {
+        const size_t room = *count + n_devices + 1;
+        if (!qp_grow((void **)list, &list_capacity, room, sizeof **list) ||
+            !qp_grow((void **)handles, &handle_capacity, room, sizeof **handles)) {
             free(*list);
+            free(*handles);
             *list = NULL;
-            return qp_fail_memory(err, (*count + n_devices) * sizeof **list, "the list of devices");
+            *handles = NULL;
+            return qp_fail_memory(err, room * sizeof **list, "the list of devices");
         }
-        for (cl_uint d = 0; d < n_devices; ++d)
-            describe_device(platforms[p], p, devices[d], d, &(*list)[(*count)++]);
+        for (cl_uint d = 0; d < n_devices; ++d, ++*count) {
+            describe_device(platforms[p], p, devices[d], d, &(*list)[*count]);
+            (*handles)[*count] = (device_handle){platforms[p], devices[d]};
+        }
     }
     return QP_OK;
 }
 
 qp_status qp_device_list(qp_device_info **list, size_t *count, qp_error *err) {
-    found_device *found = NULL;
-    size_t n = 0;
-    qp_status status = find_devices(&found, &n, err);
+    device_handle *handles;
+    qp_status status = find_devices(list, &handles, count, err);
     if (status != QP_OK) return status;
-    *list = qp_alloc(n + 1, sizeof **list, true);
-    if (*list == NULL) {
-        free(found);
-        return qp_fail_memory(err, (n + 1) * sizeof **list, "the list of devices");
-    }
-    for (size_t i = 0; i < n; ++i) (*list)[i] = found[i].info;
-    describe_host(&(*list)[n]);
-    *count = n + 1;
-    free(found);
+    free(handles);
+    describe_host(&(*list)[(*count)++]);
     return QP_OK;
 }
 
@@ -134,16 +133,35 @@ static uint32_t native_lanes(const qp_device *device, cl_device_info what, uint3
     return lanes == 2 ? 4 : lanes; /* widths of two are not worth their shuffles */
 }
 
-/* The device that `which` means, among n; NULL when there is none such. */
-static const found_device *choose(const found_device *found, size_t n, const char *which) {
-    if (which[0] == '\0') return n == 0 ? NULL : &found[0];
-    for (size_t i = 0; i < n; ++i) {
-        if (strcmp(found[i].info.id, which) == 0) return &found[i];
+/* What speaks for a device when nobody chose one: the more the better. */
+static int rank(const qp_device_info *info) {
+    if (info->is_cpu && info->has_double && strstr(info->platform, "Portable Computing Language") != NULL)
+        return 3;
+    return !info->has_double ? 0 : info->rounds_correctly ? 2 : 1;
+}
+
+size_t qp_device_choose(const qp_device_info *list, size_t n, const char *which) {
+    size_t best = n;
+    if (which[0] == '\0') {
+        for (size_t i = 0; i < n; ++i) {
+            if (best == n || rank(&list[i]) > rank(&list[best])) best = i;
+        }
+        return best;
     }
     for (size_t i = 0; i < n; ++i) {
-        if (contains(found[i].info.name, which)) return &found[i];
+        if (strcmp(list[i].id, which) == 0) return i;
     }
-    return NULL;
+    for (size_t i = 0; i < n; ++i) {
+        if (contains(list[i].name, which)) return i;
+    }
+    return n;
+}
+
+/* A number from the environment in [1, most]; `otherwise` where there is none. */
+static uint32_t number_from(const char *variable, uint32_t most, uint32_t otherwise) {
+    const char *text = getenv(variable);
+    const long n = text == NULL ? 0 : strtol(text, NULL, 10);
+    return n >= 1 && n <= (long)most ? (uint32_t)n : otherwise;
 }
 
 qp_status qp_device_open(const char *which, qp_device **device, qp_error *err) {
@@ -160,15 +178,16 @@ qp_status qp_device_open(const char *which, qp_device **device, qp_error *err) {
         *device = d;
         return QP_OK;
     }
-    found_device *found = NULL;
+    qp_device_info *list;
+    device_handle *handles;
     size_t n = 0;
-    qp_status status = find_devices(&found, &n, err);
+    qp_status status = find_devices(&list, &handles, &n, err);
     if (status == QP_OK) {
-        const found_device *chosen = choose(found, n, which);
-        if (chosen != NULL) {
-            d->info = chosen->info;
-            d->id = chosen->id;
-            status = open_queue(d, chosen->platform, err);
+        const size_t chosen = qp_device_choose(list, n, which);
+        if (chosen < n) {
+            d->info = list[chosen];
+            d->id = handles[chosen].id;
+            status = open_queue(d, handles[chosen].platform, err);
         } else if (n == 0) {
             status =
                 qp_fail(err, QP_SYSTEM,
@@ -177,13 +196,15 @@ qp_status qp_device_open(const char *which, qp_device **device, qp_error *err) {
             status = qp_fail(err, QP_SYSTEM, "no OpenCL device is called '%s' (see quadplan devices)", which);
         }
     }
-    free(found);
+    free(list);
+    free(handles);
     if (status != QP_OK) {
         qp_device_free(d);
         return status;
     }
     d->lanes_float = native_lanes(d, CL_DEVICE_NATIVE_VECTOR_WIDTH_FLOAT, 16);
     d->lanes_double = native_lanes(d, CL_DEVICE_NATIVE_VECTOR_WIDTH_DOUBLE, 8);
+    d->items = number_from("QUADPLAN_GROUP_ITEMS", 1024, 0);
     *device = d;
     return QP_OK;
 }

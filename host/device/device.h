@@ -19,6 +19,11 @@ typedef struct qp_device_info {
  */
 qp_status qp_device_list(qp_device_info **list, size_t *count, qp_error *err);
 
+/* Index of the OpenCL device that `which` means among n, or n when there is none such. "" is the default: PoCL's CPU device, else
+ * the first that has double and divides correctly rounded, else the first that has double, else the first; so that it does not
+ * depend on the order in which the loader finds drivers. */
+size_t qp_device_choose(const qp_device_info *list, size_t n, const char *which);
+
 /* Filled in when the device was opened; owned by it. */
 const qp_device_info *qp_device_get_info(const qp_device *device);
 bool qp_device_is_host(const qp_device *device);

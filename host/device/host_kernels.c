@@ -2,9 +2,14 @@
 #define QP_HOST_TABLE qp_host_kernels_any
 #include "host/device/host_kernels_body.h"
 
+#include <stdbool.h>
+#include <stdlib.h>
+
 const qp_host_kernels *qp_host_kernels_for(qp_precision precision) {
 #ifdef __x86_64__
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+    const char *plain = getenv("QUADPLAN_HOST_PLAIN");
+    const bool any = plain != NULL && plain[0] != '\0';
+    if (!any && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
         return &qp_host_kernels_fma[precision];
 #endif
     return &qp_host_kernels_any[precision];

@@ -19,7 +19,8 @@ struct qp_device {
     cl_context context;
     cl_command_queue queue;
     uint32_t lanes_float, lanes_double; /* of the device's registers; 1 where items are lanes themselves */
-    qp_pending *pending;                /* launches whose time is still to be read */
+    uint32_t items;      /* work-items of every group, from QUADPLAN_GROUP_ITEMS; 0: as each kernel likes */
+    qp_pending *pending; /* launches whose time is still to be read */
     size_t n_pending, pending_capacity;
 };
 
