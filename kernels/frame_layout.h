@@ -23,10 +23,11 @@
 /* The positions buffer begins with the frame that all positions are relative to, and then holds 3 reals a vertex: a vertex at x,
  * in the mesh's own coordinates, is stored as (x - centre) / scale. centre is 0 unless the mesh is far from the origin, scale is a
  * power of two near the mesh's size, so that nothing overflows or vanishes on the way and a mesh that is small and far away
- * keeps its digits. */
+ * keeps its digits. A float alone may be many times the mesh's size away from its middle, so centre is the sum of two reals. */
 #define QP_POSITION_CENTRE 0u /* 3 reals */
 #define QP_POSITION_SCALE 3u
-#define QP_POSITION_FIRST 4u /* first real of vertex 0 */
+#define QP_POSITION_REST 4u  /* 3 reals to add to centre */
+#define QP_POSITION_FIRST 8u /* first real of vertex 0 */
 
 /* A coordinate x of a (u,v) is held by its distance to the nearer end of [0,1]: x up to 1/2 as it is, beyond as x - 1, with -0 for
  * 1, so that the sign bit tells the end. Turning a patch (x becomes 1 - x) flips the sign, and going down the quadtree doubles:

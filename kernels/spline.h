@@ -226,12 +226,12 @@ QP_FUNCTION void QP_NAME(write_derivatives)(__global real *out, real4 da, real4 
     const real4 u = (turn & 1u) != 0 ? db : da, v = (turn & 1u) != 0 ? da : db;
     const real su = ((turn + 1u) & 2u) != 0 ? -scale : scale, sv = (turn & 2u) != 0 ? -scale : scale;
     /* + 0 makes +0 of -0, so that a turn shows in no bit of a zero. */
-    out[0] = fma(u.x, su, QP_R(0.0));
-    out[1] = fma(u.y, su, QP_R(0.0));
-    out[2] = fma(u.z, su, QP_R(0.0));
-    out[3] = fma(v.x, sv, QP_R(0.0));
-    out[4] = fma(v.y, sv, QP_R(0.0));
-    out[5] = fma(v.z, sv, QP_R(0.0));
+    out[0] = u.x * su + QP_R(0.0);
+    out[1] = u.y * su + QP_R(0.0);
+    out[2] = u.z * su + QP_R(0.0);
+    out[3] = v.x * sv + QP_R(0.0);
+    out[4] = v.y * sv + QP_R(0.0);
+    out[5] = v.z * sv + QP_R(0.0);
 }
 
 /* The same for the first `block` lanes of a leaf that is the whole patch. */
@@ -266,9 +266,11 @@ QP_FUNCTION int QP_NAME(write_samples)(__global real *vertices, __global uchar *
     const lanes length2 = fma_lanes(n[2], n[2], fma_lanes(n[1], n[1], mul_lanes(n[0], n[0])));
     const lanes inverse = div_lanes(splat(QP_R(1.0)), sqrt_lanes(length2));
     const lanes scale = splat(positions[QP_POSITION_SCALE]);
-    store_lanes(fma_lanes(add_lanes(splat(origin.x), p[0]), scale, splat(positions[0])), result[0]);
-    store_lanes(fma_lanes(add_lanes(splat(origin.y), p[1]), scale, splat(positions[1])), result[1]);
-    store_lanes(fma_lanes(add_lanes(splat(origin.z), p[2]), scale, splat(positions[2])), result[2]);
+    const real first[3] = {origin.x, origin.y, origin.z};
+    for (uint c = 0; c < 3u; ++c) {
+        const lanes at = add_lanes(splat(first[c]), p[c]), rest = splat(positions[QP_POSITION_REST + c]);
+        store_lanes(add_lanes(fma_lanes(at, scale, rest), splat(positions[QP_POSITION_CENTRE + c])), result[c]);
+    }
     for (uint c = 0; c < 3u; ++c) store_lanes(mul_lanes(n[c], inverse), result[3u + c]);
     const lanes noise = mul_lanes(splat(QP_NOISE), size);
     const lanes slopes2 =
@@ -294,13 +296,14 @@ QP_FUNCTION int QP_NAME(write_samples)(__global real *vertices, __global uchar *
     }
     __global real *out = vertices + 6u * i;
     __global uchar *out_flags = flags + i;
+    /* + 0 makes +0 of -0: some devices' fma signs a zero as it likes (positions end in such a sum). */
     for (uint l = 0; l < block; ++l, out += 6) {
         out[0] = result[0][l];
         out[1] = result[1][l];
         out[2] = result[2][l];
-        out[3] = result[3][l];
-        out[4] = result[4][l];
-        out[5] = result[5][l];
+        out[3] = result[3][l] + QP_R(0.0);
+        out[4] = result[4][l] + QP_R(0.0);
+        out[5] = result[5][l] + QP_R(0.0);
         out_flags[l] = (uchar)flag[l];
     }
     return special;

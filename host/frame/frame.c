@@ -25,10 +25,14 @@ qp_status qp_frame_update_positions(qp_frame *frame, qp_error *err) {
             return qp_fail(err, QP_BAD_INPUT, "position %g of vertex %zu is not within %g of the origin",
                            mesh->positions[i], i / 3, QP_COORDINATE_LIMIT);
     }
-    void *local = qp_alloc(reals, frame->real_size, false);
+    void *local = qp_alloc(reals, frame->real_size, true);
     if (local == NULL) return qp_fail_memory(err, reals * frame->real_size, "positions");
     const qp_local_frame f = qp_mesh_local_frame(mesh);
-    for (size_t axis = 0; axis < 3; ++axis) put_real(frame, local, QP_POSITION_CENTRE + axis, f.centre[axis]);
+    for (size_t axis = 0; axis < 3; ++axis) {
+        const double most = frame->options.precision == QP_FLOAT ? (double)(float)f.centre[axis] : f.centre[axis];
+        put_real(frame, local, QP_POSITION_CENTRE + axis, most);
+        put_real(frame, local, QP_POSITION_REST + axis, f.centre[axis] - most);
+    }
     put_real(frame, local, QP_POSITION_SCALE, ldexp(1.0, f.exponent));
     for (size_t i = 0; i < count; ++i)
         put_real(frame, local, QP_POSITION_FIRST + i,

@@ -56,7 +56,7 @@ qp_local_frame qp_mesh_local_frame(const qp_mesh *mesh) {
     for (size_t axis = 0; axis < 3; ++axis) {
         const double middle = low[axis] / 2 + high[axis] / 2;
         if (fabs(middle) > 4 * extent)
-            f.centre[axis] = (double)(float)middle;
+            f.centre[axis] = (double)(float)middle + (double)(float)(middle - (double)(float)middle);
         else
             farthest = fmax(farthest, fmax(fabs(low[axis]), fabs(high[axis])));
     }

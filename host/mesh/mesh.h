@@ -73,7 +73,7 @@ struct qp_mesh {
  * lies more than four of its extents away from 0: the difference is then exact (Sterbenz), so that no digits are lost which x
  * itself still holds; elsewhere centre is 0 and nothing changes but the exponent. */
 typedef struct qp_local_frame {
-    double centre[3]; /* numbers of float */
+    double centre[3]; /* sums of two floats */
     int exponent;     /* -100 to 100, so that the scale is a normal number of float */
 } qp_local_frame;
 qp_local_frame qp_mesh_local_frame(const qp_mesh *mesh);
