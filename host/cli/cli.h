@@ -91,6 +91,12 @@ void cli_print_warning(void *context, const char *line);
 qp_status cli_stream_check_name(const char *path, qp_error *err);
 qp_status cli_stream_write(const qp_stream *stream, const char *path, qp_error *err);
 
+/* ---- What a tolerance came to (tolerance.c) ---- nothing where `tolerance` is 0 */
+void cli_tolerance_json(qp_json *json, double tolerance, const qp_stream *stream);
+void cli_tolerance_text(double tolerance, const qp_stream *stream);
+/* A line on stderr where the largest factors are not enough. */
+void cli_tolerance_warn(double tolerance, const qp_stream *stream);
+
 #define CLI_PRECISIONS "float|double"
 #define CLI_SPACINGS "equal|fractional_even|fractional_odd"
 

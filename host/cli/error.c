@@ -65,7 +65,7 @@ static qp_status evaluate(const cli_evaluation *evaluation, const cli_evaluation
                           uint64_t samples, uint64_t seed, qp_error_report *report, qp_error *err) {
     qp_stream stream = {0};
     if (strcmp(set, "grid") == 0) {
-        qp_tessellation tessellation = {.spacing = (qp_spacing)o->spacing, .factor = (float)o->tess};
+        const qp_tessellation tessellation = cli_evaluation_tessellation(o);
         qp_status status = qp_frame_eval(evaluation->frame, &tessellation, &stream, err);
         if (status != QP_OK) return status;
         return qp_reference_compare(evaluation->mesh, &stream, NULL, report, err);

@@ -62,6 +62,7 @@ static void print_result(bool as_json, const char *name, const cli_evaluation *e
         printf("  %.2f million samples a second, %.4f of the speed of memset\n", rate * 1e-6, ratio);
         printf("  control points %" PRIu64 " bytes, stream hash %016" PRIx64 "\n", t->peak_support_bytes,
                s->hash);
+        cli_tolerance_text(options->tolerance, s);
         return;
     }
     char hash[20];
@@ -69,7 +70,8 @@ static void print_result(bool as_json, const char *name, const cli_evaluation *e
     qp_json json;
     qp_json_begin(&json, stdout);
     qp_json_text(&json, "mesh", name);
-    qp_json_real(&json, "tess", options->tess);
+    if (options->tolerance == 0) qp_json_real(&json, "tess", options->tess);
+    cli_tolerance_json(&json, options->tolerance, s);
     qp_json_text(&json, "spacing", spacings[options->spacing]);
     qp_json_text(&json, "precision", options->precision == QP_DOUBLE ? "double" : "float");
     qp_json_integer(&json, "patches", evaluation->mesh->n_patches);
@@ -111,11 +113,12 @@ static qp_status run(int argc, char **argv, qp_error *err) {
     cli_evaluation evaluation;
     status = cli_evaluation_open(arguments.values[0], &o, true, &evaluation, err);
     if (status != QP_OK) return status;
-    qp_tessellation tessellation = {.spacing = (qp_spacing)o.spacing, .factor = (float)o.tess};
+    const qp_tessellation tessellation = cli_evaluation_tessellation(&o);
     qp_stream stream = {0};
     timings *t = qp_alloc(1, sizeof *t, true);
     if (t == NULL) status = qp_fail_memory(err, sizeof *t, "timings");
     if (status == QP_OK) status = measure(&evaluation, &tessellation, repeats, t, &stream, err);
+    if (status == QP_OK) cli_tolerance_warn(o.tolerance, &stream);
     if (status == QP_OK && path != NULL) status = cli_stream_write(&stream, path, err);
     if (status == QP_OK) print_result(json, arguments.values[0], &evaluation, &o, t, &stream);
     free(t);

@@ -33,3 +33,9 @@ void cli_evaluation_close(cli_evaluation *evaluation) {
     qp_mesh_free(evaluation->mesh);
     *evaluation = (cli_evaluation){0};
 }
+
+qp_tessellation cli_evaluation_tessellation(const cli_evaluation_options *o) {
+    const bool largest = o->tolerance != 0 && !o->tess_given;
+    return (qp_tessellation){
+        .spacing = (qp_spacing)o->spacing, .factor = largest ? 64 : (float)o->tess, .tolerance = o->tolerance};
+}

@@ -6,7 +6,8 @@
 
 typedef struct cli_evaluation_options {
     cli_mesh_options mesh;
-    double tess;
+    double tess, tolerance; /* tolerance 0: none */
+    bool tess_given;
     int spacing, precision; /* indices into CLI_SPACINGS, CLI_PRECISIONS, which are the API's values */
     uint64_t depth;         /* 0: the library's default */
     const char *device;     /* NULL: the library's default */
@@ -19,7 +20,9 @@ typedef struct cli_evaluation_options {
 /* clang-format off */
 #define CLI_EVALUATION_OPTIONS(o)                                                                            \
     {"--tess", "F", "uniform tessellation factor, 1 to 64 (default 16)",                                     \
-     CLI_REAL, &(o).tess, 1, 64, NULL},                                                                      \
+     CLI_REAL, &(o).tess, 1, 64, &(o).tess_given},                                                           \
+    {"--tolerance", "T", "instead, the least factors that err by no more than T times the bounding box's diagonal",        \
+     CLI_REAL, &(o).tolerance, 1e-300, 1e300, NULL},                                                                      \
     {"--spacing", CLI_SPACINGS, "of the tessellator (default equal)",                                        \
      CLI_CHOICE, &(o).spacing, 0, 0, NULL},                                                                  \
     CLI_SAMPLING_OPTIONS(o)
@@ -50,6 +53,8 @@ typedef struct cli_evaluation {
 /* Frees what it made when it fails. want_triangles: triangles and the stream's hash too. */
 qp_status cli_evaluation_open(const char *argument, const cli_evaluation_options *options,
                               bool want_triangles, cli_evaluation *evaluation, qp_error *err);
+/* Of --tess, --spacing and --tolerance; with a tolerance --tess, when given, is the largest factor allowed. */
+qp_tessellation cli_evaluation_tessellation(const cli_evaluation_options *options);
 void cli_evaluation_close(cli_evaluation *evaluation);
 
 #endif

@@ -11,7 +11,7 @@
 typedef struct overrides {
     bool colour_given, wireframe, tess_given, spacing_given, size_given;
     int colour, spacing, precision;
-    double tess;
+    double tess, tolerance; /* tolerance 0: the scene's */
     uint64_t depth;
     cli_sizes size;
     const char *device;
@@ -23,6 +23,11 @@ static qp_status apply(const overrides *o, qp_scene *scene, qp_error *err) {
     if (o->tess_given) {
         scene->factor = o->tess;
         scene->random_factors = false;
+        scene->tolerance = 0;
+    }
+    if (o->tolerance != 0) {
+        scene->tolerance = o->tolerance;
+        if (!o->tess_given) scene->factor = 64;
     }
     if (o->spacing_given) scene->spacing = (qp_spacing)o->spacing;
     if (o->depth != 0) scene->surface_options.depth = (uint32_t)o->depth;
@@ -82,6 +87,7 @@ static void print_result(bool as_json, const char *scene, const char *picture, c
                w->image.width, w->image.height, s->n_samples, s->n_triangles);
         printf("  evaluated on %s in %.2f ms, drawn by %s\n", qp_device_name(w->device), s->frame_ms,
                w->backend);
+        cli_tolerance_text(w->scene->tolerance, s);
         return;
     }
     char hash[20];
@@ -95,6 +101,7 @@ static void print_result(bool as_json, const char *scene, const char *picture, c
     qp_json_integer(&json, "patches", w->mesh->n_patches);
     qp_json_integer(&json, "samples", s->n_samples);
     qp_json_integer(&json, "triangles", s->n_triangles);
+    cli_tolerance_json(&json, w->scene->tolerance, s);
     qp_json_real(&json, "frame_ms", s->frame_ms);
     qp_json_text(&json, "stream_hash", hash);
     qp_json_text(&json, "device", qp_device_name(w->device));
@@ -111,6 +118,8 @@ static qp_status run(int argc, char **argv, qp_error *err) {
         {"--color", COLOURS, "what to colour by", CLI_CHOICE, &o.colour, 0, 0, &o.colour_given},
         {"--wireframe", NULL, "draw the tessellation's edges", CLI_FLAG, &o.wireframe, 0, 0, NULL},
         {"--tess", "F", "one tessellation factor for all, 1 to 64", CLI_REAL, &o.tess, 1, 64, &o.tess_given},
+        {"--tolerance", "T", "instead, the least factors that err by no more than T times the bounding box's diagonal",
+         CLI_REAL, &o.tolerance, 1e-300, 1e300, NULL},
         {"--spacing", CLI_SPACINGS, "of the tessellator", CLI_CHOICE, &o.spacing, 0, 0, &o.spacing_given},
         {"--size", "WxH", "of the picture, in pixels", CLI_SIZES, &o.size, 0, 0, &o.size_given},
         {"--precision", CLI_PRECISIONS, "of stencils and kernels (default float)", CLI_CHOICE, &o.precision,
@@ -131,6 +140,7 @@ static qp_status run(int argc, char **argv, qp_error *err) {
 
     work w = {0};
     status = draw(arguments.values[0], &o, &w, err);
+    if (status == QP_OK) cli_tolerance_warn(w.scene->tolerance, &w.stream);
     if (status == QP_OK) status = qp_image_write(picture, &w.image, err);
     if (status == QP_OK) print_result(json, arguments.values[0], picture, &w);
     work_free(&w);

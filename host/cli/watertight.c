@@ -82,8 +82,8 @@ static qp_status run(int argc, char **argv, qp_error *err) {
     qp_watertight_report report;
     if (random && (factors = random_factors(evaluation.mesh, o.tess, seed)) == NULL)
         status = qp_fail_memory(err, evaluation.mesh->n_edges * sizeof *factors, "factors of edges");
-    const qp_tessellation tessellation = {
-        .spacing = (qp_spacing)o.spacing, .factor = (float)o.tess, .edge_factors = factors};
+    qp_tessellation tessellation = cli_evaluation_tessellation(&o);
+    tessellation.edge_factors = factors;
     if (status == QP_OK) status = qp_frame_eval(evaluation.frame, &tessellation, &stream, err);
     if (status == QP_OK) status = qp_watertight_check(evaluation.mesh, &stream, &report, err);
     if (status == QP_OK) {

@@ -18,6 +18,7 @@ enum {
     GIVEN_CREASE,
     GIVEN_TRIANGLES,
     GIVEN_RANDOM,
+    GIVEN_FACTOR,
     GIVEN_EYE,
     GIVEN_TARGET,
     GIVEN_ANGLE,
@@ -79,7 +80,8 @@ static const qp_field random_fields[] = {
     {0}};
 
 static const qp_field tessellation_fields[] = {
-    {.key = "factor", .kind = QP_FIELD_NUMBER, .offset = AT(factor), .low = 1, .high = 64},
+    {.key = "factor", .kind = QP_FIELD_NUMBER, .offset = AT(factor), .low = 1, .high = 64, .given = GIVEN_FACTOR},
+    {.key = "tolerance", .kind = QP_FIELD_NUMBER, .offset = AT(tolerance), .low = 1e-300, .high = 1e300},
     {.key = "spacing", .kind = QP_FIELD_CHOICE, .offset = AT(spacing), .names = spacing_names},
     {.key = "halve_ngons", .kind = QP_FIELD_FLAG, .offset = AT(halve_ngons)},
     {.key = "random", .kind = QP_FIELD_SECTION, .section = random_fields, .given = GIVEN_RANDOM},
@@ -261,6 +263,9 @@ static qp_status check_whole(const char *name, draft *d, qp_error *err) {
         return qp_fail(err, QP_BAD_INPUT, "%s: tessellation.random.min is above max", name);
     s->fit = !given[GIVEN_EYE];
     s->random_factors = given[GIVEN_RANDOM];
+    if (s->tolerance != 0 && s->random_factors)
+        return qp_fail(err, QP_BAD_INPUT, "%s: tessellation has both \"random\" and \"tolerance\"", name);
+    if (s->tolerance != 0 && !given[GIVEN_FACTOR]) s->factor = 64;
     s->ground = given[GIVEN_GROUND];
     if (given[GIVEN_WIRE] && !(s->wire_width > 0)) s->wire_width = 1;
     s->mesh_options.override_boundary = given[GIVEN_BOUNDARY];

@@ -41,6 +41,7 @@ typedef struct qp_scene {
 
     qp_spacing spacing;
     double factor;
+    double tolerance; /* 0: none; else factors are chosen, up to .factor */
     bool halve_ngons;    /* children of n-gons get half the factor, so that edges shared with quads match */
     bool random_factors; /* every edge and inside draws its own integer factor from [min, max] */
     uint64_t factor_seed;

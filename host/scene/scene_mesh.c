@@ -89,6 +89,8 @@ qp_status qp_scene_tessellation(const qp_scene *scene, const qp_mesh *mesh, qp_t
                                 float **factors, qp_error *err) {
     *factors = NULL;
     *tessellation = (qp_tessellation){.spacing = scene->spacing, .factor = (float)scene->factor};
+    tessellation->tolerance = scene->tolerance;
+    if (scene->tolerance != 0) return QP_OK;
     bool ngons = mesh->n_patches != mesh->n_faces;
     if (!scene->random_factors && !(ngons && scene->halve_ngons)) return QP_OK;
     bool *beside_ngon = qp_alloc(mesh->n_edges, sizeof *beside_ngon, true);

@@ -50,6 +50,21 @@ import json, sys
 a, b = (json.load(open(f))["stream_hash"] for f in sys.argv[1:])
 sys.exit(a != b)' "$work/eval.json" "$work/evalhost.json"
 
+run eval "$cube" --tolerance 1e-2 --device host --json
+check "eval --tolerance" [ "$code" -eq 0 ]
+keys "eval --tolerance" tolerance bound patches_over_tolerance factor_min factor_mean factor_max samples
+value 'o["tolerance"] == 0.01 and 0 < o["bound"] <= 0.01 and o["patches_over_tolerance"] == 0'
+value '1 < o["factor_min"] <= o["factor_max"] < 64 and "tess" not in o'
+check "a tolerance that is met is quiet" [ ! -s "$work/stderr" ]
+run eval "$cube" --tolerance 1e-5 --tess 4 --device host --json
+check "eval --tolerance, too few" [ "$code" -eq 0 ]
+value 'o["bound"] > 1e-5 and o["patches_over_tolerance"] == 6 and o["factor_max"] == 4'
+check "a warning says so" grep -q '6 patches need larger factors' "$work/stderr"
+run watertight gen:prism --tolerance 1e-2 --spacing fractional_odd --device host
+check "watertight --tolerance" [ "$code" -eq 0 ]
+run eval "$cube" --tolerance 0
+check "eval --tolerance 0" [ "$code" -eq 2 ]
+
 run stress --list
 check "stress --list" grep -q '^far-scaled .*24 cases' "$work/stdout"
 run stress --device host --family far-scaled --cases 3 --samples 20 --json

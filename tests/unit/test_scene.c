@@ -76,6 +76,34 @@ static void refuses(void) {
     CHECK(qp_scene_read("/", &s, &err) == QP_BAD_INPUT);
 }
 
+static void tolerances(void) {
+    static const char both[] =
+        "{\"why\": \"w\", \"mesh\": {\"generate\": \"prism\"}, \"tessellation\": {\"tolerance\": 1e-3%s}}";
+    static const struct {
+        const char *more;
+        double factor;
+    } good[] = {{"", 64}, {", \"factor\": 8", 8}};
+    qp_error err;
+    qp_scene *s;
+    char text[200];
+    for (int i = 0; i < 2; i++) {
+        qp_mesh *m = NULL;
+        qp_tessellation t;
+        float *factors = NULL;
+        snprintf(text, sizeof text, both, good[i].more);
+        if (!CHECK_OK(parse(text, &s, &err), err)) return;
+        CHECK(s->tolerance == 1e-3 && s->factor == good[i].factor);
+        if (CHECK_OK(qp_scene_mesh(s, NULL, NULL, &m, &err), err) &&
+            CHECK_OK(qp_scene_tessellation(s, m, &t, &factors, &err), err))
+            CHECK(t.tolerance == 1e-3 && (double)t.factor == good[i].factor && t.patch_factors == NULL &&
+                  factors == NULL);
+        qp_mesh_free(m);
+        qp_scene_free(s);
+    }
+    snprintf(text, sizeof text, both, ", \"random\": {\"seed\": 1}");
+    CHECK(parse(text, &s, &err) == QP_BAD_INPUT && strstr(err.message, "tolerance") != NULL);
+}
+
 /* Points that a patch side makes on an edge: the factor, or twice it on a half edge. */
 static void factors_match(qp_spacing spacing, bool random) {
     qp_error err;
@@ -119,6 +147,7 @@ static void factors_match(qp_spacing spacing, bool random) {
 }
 
 int main(void) {
+    tolerances();
     reads_values();
     refuses();
     factors_match(QP_EQUAL, false);
