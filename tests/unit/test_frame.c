@@ -155,7 +155,9 @@ static void test_cracks(qp_device *host, const qp_surface *surface) {
                                      {.factor = 8},
                                      {.factor = 16},
                                      {.factor = 6, .spacing = QP_FRACTIONAL_EVEN},
-                                     {.factor = 5.3f, .spacing = QP_FRACTIONAL_EVEN}};
+                                     {.factor = 5.3f, .spacing = QP_FRACTIONAL_EVEN},
+                                     {.factor = 1, .spacing = QP_FRACTIONAL_ODD},
+                                     {.factor = 9.3f, .spacing = QP_FRACTIONAL_ODD}};
     qp_error err = {0};
     qp_frame *frame = NULL;
     qp_frame_options options = {.precision = QP_DOUBLE, .want_triangles = 1};
