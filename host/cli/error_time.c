@@ -59,6 +59,19 @@ static qp_status report(et_run *run, qp_error *err) {
     return status;
 }
 
+/* That results can be kept is found out before the run, not after it. */
+static qp_status check_outputs(const et_options *o, qp_error *err) {
+    const char *const files[] = {o->json, o->csv, o->chart};
+    for (size_t i = 0; i < sizeof files / sizeof *files; ++i) {
+        if (files[i] == NULL || strcmp(files[i], "-") == 0) continue;
+        qp_output output;
+        qp_status status = qp_output_open(&output, files[i], err);
+        if (status != QP_OK) return status;
+        qp_output_abandon(&output);
+    }
+    return o->chart != NULL ? et_draw_chart(NULL, o->chart, err) : QP_OK;
+}
+
 static qp_status run_error_time(int argc, char **argv, qp_error *err) {
     et_options o = {
         .samples = 64, .repeats = 7, .max_level = ET_MOST_LEVEL, .memory_mb = 4096, .setup_limit_ms = 5000};
@@ -92,6 +105,8 @@ static qp_status run_error_time(int argc, char **argv, qp_error *err) {
     if (status != QP_OK || arguments.help) return status;
     if (o.chart != NULL && !ends_in(o.chart, ".png") && !ends_in(o.chart, ".svg"))
         return qp_fail(err, QP_BAD_INPUT, "%s: a chart must be named .png or .svg", o.chart);
+    status = check_outputs(&o, err);
+    if (status != QP_OK) return status;
     et_run *run = qp_alloc(1, sizeof *run, true);
     if (run == NULL) return qp_fail_memory(err, sizeof *run, "the benchmark");
     status = et_measure(run, arguments.values[0], &o, err);

@@ -40,10 +40,11 @@ typedef struct et_configuration {
     uint64_t bytes;                           /* of tables and points; 0 where a peer does not tell */
     double position_max, position_rms, normal_max, normal_rms;
     uint64_t nonfinite;
-    bool measured; /* errors are there */
-    bool dropped;  /* was left out after all: see skips */
-    bool front;    /* no configuration of anyone is as fast and as near */
-    bool beats;    /* a peer's: no configuration of quadplan is as fast and as near */
+    uint64_t apart; /* samples where a peer means another surface, left out of its errors */
+    bool measured;  /* errors are there */
+    bool dropped;   /* was left out after all: see skips */
+    bool front;     /* no configuration of anyone is as fast and as near */
+    bool beats;     /* a peer's: no configuration of quadplan is as fast and as near */
     double ratio; /* a peer's: its time over that of the fastest quadplan that is as near; 0: there is none */
 } et_configuration;
 
@@ -104,7 +105,7 @@ void et_mark_fronts(et_run *run);
 void et_print_table(const et_run *run, FILE *file);
 void et_write_json(const et_run *run, FILE *file);
 void et_write_csv(const et_run *run, FILE *file);
-/* Calls the plotting script on a JSON file. */
+/* Calls the plotting script on a JSON file; without one it only finds out whether it could. */
 qp_status et_draw_chart(const char *json_path, const char *chart_path, qp_error *err);
 
 #endif

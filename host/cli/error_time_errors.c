@@ -137,6 +137,8 @@ static void read_vertices(void *context, size_t begin, size_t end, unsigned work
             n[k] = du[(k + 1) % 3] * dv[(k + 2) % 3] - du[(k + 2) % 3] * dv[(k + 1) % 3];
         const double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
         for (int k = 0; k < 3; ++k) n[k] = length > 0 ? n[k] / length : 0;
+        /* The comparison leaves out what is not finite. */
+        if (j->peer->apart != NULL && j->peer->apart[i]) p[0] = (double)NAN;
     }
 }
 

@@ -97,6 +97,13 @@ void et_print_table(const et_run *run, FILE *file) {
         else
             fprintf(file, "left out: %s: %s\n", skip->name, skip->reason);
     }
+    for (size_t i = 0; i < run->n_configurations; ++i) {
+        const et_configuration *c = &run->configurations[i];
+        if (c->apart > 0)
+            fprintf(file,
+                    "%s: errors without %llu samples, near vertices where its rules make another surface\n",
+                    c->name, (unsigned long long)c->apart);
+    }
     fprintf(file, "peers below or left of quadplan's front: %llu\n", count_beating(run));
 }
 
@@ -130,6 +137,7 @@ static void write_configuration(const et_run *run, const et_configuration *c, qp
     write_real(json, "normal_max_deg", c->normal_max);
     write_real(json, "normal_rms_deg", c->normal_rms);
     qp_json_integer(json, "nonfinite", c->nonfinite);
+    if (c->series != NULL) qp_json_integer(json, "apart", c->apart);
     qp_json_bool(json, "front", c->front);
     if (c->series != NULL) {
         qp_json_bool(json, "beats_quadplan", c->beats);
@@ -179,17 +187,17 @@ void et_write_json(const et_run *run, FILE *file) {
 void et_write_csv(const et_run *run, FILE *file) {
     fputs("series,library,precision,level,crease_nodes,terminal_nodes,exact_tail,threads,ns_per_sample,setup_"
           "ms,locate_ms,"
-          "bytes,position_max,position_rms,normal_max_deg,normal_rms_deg,nonfinite,front,ratio\n",
+          "bytes,position_max,position_rms,normal_max_deg,normal_rms_deg,nonfinite,apart,front,ratio\n",
           file);
     for (size_t i = 0; i < run->n_configurations; ++i) {
         const et_configuration *c = &run->configurations[i];
         const bool ours = c->series == NULL;
-        fprintf(file, "%s,%s,%s,%u,%s,%s,%s,%u,%.6g,%.6g,%.6g,%llu,%.6g,%.6g,%.6g,%.6g,%llu,%d,", c->name,
-                library_name(c), precision_name(c), c->level, ours ? (c->crease_nodes ? "1" : "0") : "",
-                ours ? (c->terminal_nodes ? "1" : "0") : "", ours ? (c->exact_tail ? "1" : "0") : "",
-                threads_of(run, c), c->ns, c->setup_ms, c->locate_ms, (unsigned long long)c->bytes,
-                c->position_max, c->position_rms, c->normal_max, c->normal_rms,
-                (unsigned long long)c->nonfinite, c->front);
+        fprintf(file, "%s,%s,%s,%u,%s,%s,%s,%u,%.6g,%.6g,%.6g,%llu,%.6g,%.6g,%.6g,%.6g,%llu,%llu,%d,",
+                c->name, library_name(c), precision_name(c), c->level,
+                ours ? (c->crease_nodes ? "1" : "0") : "", ours ? (c->terminal_nodes ? "1" : "0") : "",
+                ours ? (c->exact_tail ? "1" : "0") : "", threads_of(run, c), c->ns, c->setup_ms, c->locate_ms,
+                (unsigned long long)c->bytes, c->position_max, c->position_rms, c->normal_max, c->normal_rms,
+                (unsigned long long)c->nonfinite, (unsigned long long)c->apart, c->front);
         if (c->ratio > 0) fprintf(file, "%.6g", c->ratio);
         fputc('\n', file);
     }
@@ -202,8 +210,8 @@ enum { NO_MATPLOTLIB = 4, NO_PYTHON = 127 };
 static int run_script(const char *python, const char *json_path, const char *chart_path) {
     const pid_t child = fork();
     if (child == 0) {
-        execlp(python, python, "-c", (const char *)qp_embedded_scripts[0].bytes, json_path, chart_path,
-               (char *)NULL);
+        execlp(python, python, "-c", (const char *)qp_embedded_scripts[0].bytes,
+               json_path != NULL ? json_path : "--check", chart_path, (char *)NULL);
         _exit(NO_PYTHON);
     }
     int state;

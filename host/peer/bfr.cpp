@@ -86,6 +86,7 @@ qp_status create_in(const qp_peer_series *series, const qp_peer_task *task, unsi
     std::unique_ptr<Evaluator<REAL>> e(new Evaluator<REAL>);
     e->series = series;
     e->task = task;
+    e->apart = nullptr;
     const double start = qp_now_ms();
     list_faces(e.get());
     qp_status status = make_surfaces(e.get(), level, err);

@@ -27,6 +27,7 @@ typedef struct evaluator {
     float *given;       /* [VERTEX_REALS * n_vertices] */
     uint32_t *faces;    /* [count + 3] of each sample */
     float *u, *v;       /* [count + 3] in Embree's coordinates of the face */
+    uint8_t *apart;     /* [count] */
     atomic_llong bytes; /* that Embree has asked for */
 } evaluator;
 
@@ -39,10 +40,11 @@ static void free_evaluator(qp_peer *peer) {
     free(e->faces);
     free(e->u);
     free(e->v);
+    free(e->apart);
     free(e);
 }
 
-/* Meshes that Embree cannot hold, or of which it makes another surface. */
+/* Meshes that Embree cannot hold, or of which it makes another surface all over. */
 static qp_status check_mesh(const qp_mesh *mesh, qp_error *err) {
     const qp_status bad = QP_BAD_INPUT;
     for (uint32_t f = 0; f < mesh->n_faces; ++f) {
@@ -66,6 +68,85 @@ static qp_status check_mesh(const qp_mesh *mesh, qp_error *err) {
     if (mesh->crease_method == QP_CREASE_CHAIKIN && mesh->n_creases > 0)
         return qp_fail(err, bad, "Embree has no Chaikin creases");
     return QP_OK;
+}
+
+/* Sharp edges at a vertex. */
+typedef struct edges_at {
+    uint32_t count;
+    float low, high; /* their sharpness */
+} edges_at;
+
+/* Has Embree the rule of OpenSubdiv here? Its own are: where two sharp edges meet, their sharpness decays by Chaikin's
+ * rule, which is the uniform one if both are the same; where more meet, the vertex stays in its place until all but two
+ * have gone, without a blend between the rules; a vertex's own sharpness blends with the smooth rule, whatever edges
+ * meet there; and a boundary's vertex of one face, which it takes for regular, is left to the spline's end. */
+static bool same_rule(const qp_mesh *mesh, uint32_t v, const edges_at *edges) {
+    const float sharpness = mesh->vertex_sharpness[v];
+    const bool boundary = mesh->vertex_flags[v] & QP_VERTEX_BOUNDARY;
+    const uint32_t faces = mesh->vertex_offsets[v + 1] - mesh->vertex_offsets[v];
+    if (faces == 2 && !boundary) return false;
+    if (sharpness >= QP_SHARPNESS_INFINITE) return true;
+    if (faces == 1) return false;
+    if (sharpness > 0) return edges->count < 2;
+    if (edges->count < 2) return true;
+    if (edges->low != edges->high) return false;
+    return edges->count == 2 || edges->low >= QP_SHARPNESS_INFINITE || edges->low == floorf(edges->low);
+}
+
+/* Marks in vertices[] those whose rule differs. False when memory is out. */
+static bool mark_vertices(const qp_mesh *mesh, uint8_t *vertices) {
+    edges_at *edges = qp_alloc(mesh->n_vertices, sizeof *edges, true);
+    if (edges == NULL) return false;
+    for (uint32_t i = 0; i < mesh->n_edges; ++i) {
+        const float s = mesh->edge_sharpness[i];
+        for (uint32_t end = 0; end < 2 && s > 0; ++end) {
+            edges_at *at = &edges[mesh->edge_vertices[2 * (size_t)i + end]];
+            at->low = at->count == 0 || s < at->low ? s : at->low;
+            at->high = at->count == 0 || s > at->high ? s : at->high;
+            ++at->count;
+        }
+    }
+    for (uint32_t v = 0; v < mesh->n_vertices; ++v) vertices[v] = !same_rule(mesh, v, &edges[v]);
+    free(edges);
+    return true;
+}
+
+/* A vertex moves the surface of the faces around it and of those around them. */
+static void spread(const qp_mesh *mesh, const uint8_t *from, uint8_t *to) {
+    for (uint32_t f = 0; f < mesh->n_faces; ++f) {
+        bool any = false;
+        for (uint32_t c = mesh->face_offsets[f]; c < mesh->face_offsets[f + 1]; ++c)
+            any = any || from[mesh->face_vertices[c]];
+        for (uint32_t c = mesh->face_offsets[f]; c < mesh->face_offsets[f + 1] && any; ++c)
+            to[mesh->face_vertices[c]] = 1;
+    }
+}
+
+/* Samples of faces that touch a face with such a vertex. */
+static qp_status mark_samples(evaluator *e, qp_error *err) {
+    const qp_peer_task *task = e->peer.task;
+    const qp_mesh *mesh = task->mesh;
+    uint8_t *vertices = qp_alloc(mesh->n_vertices, 1, true), *near = qp_alloc(mesh->n_vertices, 1, true);
+    e->apart = qp_alloc((size_t)task->count, 1, true);
+    qp_status status = QP_OK;
+    if (vertices == NULL || near == NULL || e->apart == NULL || !mark_vertices(mesh, vertices))
+        status = qp_fail_memory(err, (size_t)task->count, "marks of samples");
+    uint64_t n_apart = 0;
+    if (status == QP_OK) {
+        spread(mesh, vertices, near);
+        for (uint64_t i = 0; i < task->count; ++i) {
+            const uint32_t f = e->faces[i];
+            for (uint32_t c = mesh->face_offsets[f]; c < mesh->face_offsets[f + 1]; ++c)
+                e->apart[i] |= near[mesh->face_vertices[c]];
+            n_apart += e->apart[i];
+        }
+        if (n_apart > 0) e->peer.apart = e->apart;
+    }
+    free(vertices);
+    free(near);
+    if (status == QP_OK && n_apart == task->count)
+        return qp_fail(err, QP_BAD_INPUT, "Embree's crease rules make another surface of the whole mesh");
+    return status;
 }
 
 static qp_status device_status(evaluator *e, qp_error *err) {
@@ -193,8 +274,10 @@ static qp_status create(const qp_peer_series *series, const qp_peer_task *task, 
     }
     const double made = qp_now_ms();
     if (status == QP_OK) status = locate(e, err);
+    const double located = qp_now_ms();
+    if (status == QP_OK) status = mark_samples(e, err);
     e->peer.setup_ms = made - start;
-    e->peer.locate_ms = qp_now_ms() - made;
+    e->peer.locate_ms = located - made;
     const long long bytes = atomic_load(&e->bytes);
     e->peer.bytes = bytes > 0 ? (uint64_t)bytes : 0;
     if (status == QP_OK)

@@ -137,6 +137,7 @@ qp_status create(const qp_peer_series *series, const qp_peer_task *task, unsigne
         std::unique_ptr<Evaluator> e(new Evaluator);
         e->series = series;
         e->task = task;
+        e->apart = nullptr;
         const double start = qp_now_ms();
         std::unique_ptr<Far::TopologyRefiner> refiner = make_refiner(task->mesh);
         if (!refiner) return refused(err);

@@ -39,6 +39,9 @@ typedef struct qp_peer {
     double setup_ms;  /* topology: refinement, tables */
     double locate_ms; /* finding the samples' places in them */
     uint64_t bytes;   /* of tables and points, 0 where the library does not tell */
+    /* [count] 1 for samples where the peer's rules make another surface, which say nothing about its error; NULL: there
+     * are none. */
+    const uint8_t *apart;
 } qp_peer;
 
 struct qp_peer_series {
