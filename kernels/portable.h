@@ -37,7 +37,7 @@
 #define get_group_id(dimension) (qp_group)
 #define get_local_id(dimension) 0u
 #define get_local_size(dimension) 1u
-#define QP_FUNCTION static inline
+#define QP_FUNCTION static inline __attribute__((always_inline))
 #define QP_GROUP , size_t qp_group
 #define uint uint32_t
 #define ulong uint64_t
