@@ -196,7 +196,7 @@ static void add_sample(qp_stress_report *report, const qp_stress_sample *r, bool
         return;
     }
     const double *n = r->got + 3, length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-    report->normals_not_unit += fabs(length - 1) > 1e-6 && !(flagged && length == 0);
+    report->normals_not_unit += !(fabs(length - 1) <= 1e-6);
     report->no_normal += flagged;
     report->past_depth += past;
     if (past) return;
@@ -206,7 +206,7 @@ static void add_sample(qp_stress_report *report, const qp_stress_sample *r, bool
     }
     report->normals_missing += flagged && well;
     report->normals_ill += !flagged && defined && !well;
-    if (!defined || !well || r->normal_deg <= report->worst_normal_deg) return;
+    if (!defined || !well || flagged || r->normal_deg <= report->worst_normal_deg) return;
     report->worst_normal_deg = r->normal_deg;
     report->worst_normal = *r;
 }

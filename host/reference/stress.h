@@ -64,11 +64,10 @@ typedef struct qp_stress_report {
     uint64_t past_depth;      /* samples flagged as approximate: left out of worst_ulp and worst_normal_deg */
     uint64_t no_normal;       /* flagged as without a normal */
     uint64_t normals_missing; /* of them, those whose normal is well conditioned */
-    uint64_t
-        normals_not_unit; /* off 1 in length by more than 1e-6, and not a flagged 0 */
-    uint64_t normals_ill; /* neither measured nor flagged, as they are not well conditioned */
+    uint64_t normals_not_unit; /* off 1 in length by more than 1e-6, those flagged included */
+    uint64_t normals_ill;      /* neither measured nor flagged, as they are not well conditioned */
     double worst_ulp;
-    double worst_normal_deg;              /* over the well-conditioned */
+    double worst_normal_deg;              /* over the well-conditioned that are not flagged */
     qp_stress_sample worst, worst_normal; /* of the first sample that is not finite, else of worst_ulp */
 } qp_stress_report;
 
