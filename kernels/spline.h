@@ -51,6 +51,7 @@ typedef struct QP_NAME(surface_point) {
     real4 p, du, dv;
     real
         size; /* of the numbers that p, du and dv were made from, which tells their rounding; < 0: the patch's */
+    real skew_u, skew_v; /* du and dv are without skew_u dv and skew_v du: same cross product (one of the two is 0) */
     uint flags;
     int level; /* the leaf is 2^-level of the patch, or would be, were its points not stored times a power of two */
     real stretch; /* factor left out of du and dv, which are to be multiplied by it */
@@ -165,10 +166,12 @@ QP_FUNCTION real4 QP_NAME(stand_in_normal)(QP_NAME(surface_point) middle, real s
     return flags == 0 ? n : make4(QP_R(0.0), QP_R(0.0), QP_R(1.0));
 }
 
-/* Moves (u,v) an eighth of the patch towards side k (0 to 3). False where that leaves it. */
+/* Moves (u,v) about an eighth of the patch towards side k (0 to 3), to a whole number of eighths, for which the control points of
+ * level 3 are enough. False where that leaves it. */
 QP_FUNCTION int QP_NAME(step_aside)(uint k, real *u, real *v) {
     real *x = k < 2u ? u : v;
-    const real to = QP_NAME(plain)(*x) + ((k & 1u) != 0 ? QP_R(0.125) : QP_R(-0.125));
+    const real eighths = (real)(int)fma(QP_R(8.0), QP_NAME(plain)(*x), QP_R(0.5));
+    const real to = QP_R(0.125) * (eighths + ((k & 1u) != 0 ? QP_R(1.0) : QP_R(-1.0)));
     *x = to <= QP_R(0.5) ? to : -(QP_R(1.0) - to);
     return to >= QP_R(0.0) && to <= QP_R(1.0);
 }
