@@ -183,11 +183,15 @@ static void make_items(tessellation *t, qp_frame_layout *layout) {
         layout->grid_points += t->grids[g].n_points;
     }
     for (uint32_t p = 0; p < n_patches; ++p) {
+        /* Quarters take the level of the finest, so that a sample on two of them is evaluated in just the same way. */
+        uint32_t level = 0;
+        for (uint64_t i = t->factors.first[p]; i < t->factors.first[p + 1]; ++i)
+            if (t->levels[t->part_grid[i]] > level) level = t->levels[t->part_grid[i]];
         for (uint64_t i = t->factors.first[p]; i < t->factors.first[p + 1]; ++i) {
             const uint32_t g = t->part_grid[i];
             t->part_triangle[i] = layout->n_triangles;
             layout->items[layout->n_items++] =
-                (qp_frame_item){p, t->grids[g].n_points, t->levels[g], t->grid_first[g], layout->n_samples};
+                (qp_frame_item){p, t->grids[g].n_points, level, t->grid_first[g], layout->n_samples};
             layout->n_samples += t->grids[g].n_points;
             layout->n_triangles += t->grids[g].n_triangles;
         }
