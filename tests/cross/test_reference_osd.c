@@ -7,6 +7,7 @@
 #define _GNU_SOURCE
 #include "host/peer/osd.h"
 #include "host/reference/eval.h"
+#include "host/reference/stress.h"
 #include "tests/check.h"
 #include "tests/variants.h"
 
@@ -199,8 +200,31 @@ static void compare_random(void) {
     CHECK_NEAR(masks.worst_normal, 0, 1e-6);
 }
 
+/* Vertices on creases of two non-manifold edges, fans beside such a crease, fans that only touch. */
+static void compare_nonmanifold(void) {
+    enum { CASES = CHECK_SANITIZED ? 8 : 60 };
+    tally adaptive = {0, 0, 0, 0, 0};
+    mask_tally masks = {0, 0, 0, 0, 0};
+    for (uint32_t i = 0; i < CASES; ++i) {
+        qp_random random = {i};
+        qp_mesh *base;
+        qp_error err = {0};
+        if (!CHECK_OK(qp_stress_nonmanifold(&random, &base, &err), err)) continue;
+        compare_adaptive(base, 6, 1, &adaptive);
+        compare_masks(base, 1 + i % 2 + 3 * (i / 2 % 2), &masks);
+        qp_mesh_free(base);
+    }
+    judge("non-manifold soups", "uniform", &adaptive);
+    printf("%-42s %-8s %8lu points, %lu normals, %lu left out: position %.2e, normal %.2e\n",
+           "non-manifold soups, limit masks", "both", masks.checked, masks.normals, masks.unsettled, masks.worst,
+           masks.worst_normal);
+    CHECK(masks.checked > 1000);
+    CHECK_NEAR(masks.worst, 0, tolerance);
+}
+
 int main(void) {
     compare_random();
+    compare_nonmanifold();
     const char *models = check_models();
     if (models) {
         char shapes[4096];
