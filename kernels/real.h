@@ -35,7 +35,30 @@ QP_FUNCTION real4 make4(real x, real y, real z) {
 #define add4(a, b) ((a) + (b))
 #define sub4(a, b) ((a) - (b))
 #define scale4(a, s) ((a) * (s))
+#ifdef QP_SOFT_FMA
+/* fma from sums and products, for devices whose own is integer code that takes their compilers minutes: a b = high + low (Dekker),
+ * low + c and then high + ... as sums of two numbers each (Knuth), of which the lower ones are added with rounding to odd, so that the
+ * last addition rounds but once (Boldo and Melquiond, "Emulation of FMA and correctly rounded sums", IEEE Trans. Computers 57(4),
+ * 2008). No branch, the same for one number and four. Right unless a part of the product is below the normal numbers. */
+#define QP_DEFINE_FMA(type, name, as_type, as_bits, bits_type, mask_of)                                      \
+    QP_FUNCTION type name(type a, type b, type c) {                                                          \
+        const type a1 = as_type(as_bits(a) & 0xfffff000u), b1 = as_type(as_bits(b) & 0xfffff000u);           \
+        const type a2 = a - a1, b2 = b - b1, high = a * b;                                                   \
+        const type low = a2 * b2 - (((high - a1 * b1) - a1 * b2) - a2 * b1);                                 \
+        const type s = c + low, s0 = s - c, s1 = (c - (s - s0)) + (low - s0);                                \
+        const type t = high + s, t0 = t - high, t1 = (high - (t - t0)) + (s - t0);                           \
+        const type r = t1 + s1, r0 = r - t1, rest = (t1 - (r - r0)) + (s1 - r0);                             \
+        const bits_type bits = as_bits(r), away = 1u - ((as_bits(rest) ^ bits) >> 31 << 1);                  \
+        return t + as_type(bits + (away & ((bits & 1u) - 1u) & mask_of(rest != 0.0f)));                      \
+    }
+#define QP_MASK_OF_INT(i) (0u - (uint)(i))
+QP_DEFINE_FMA(real, soft_fma, as_float, as_uint, uint, QP_MASK_OF_INT)
+QP_DEFINE_FMA(real4, soft_fma4, as_float4, as_uint4, uint4, as_uint4)
+#define fma(a, b, c) soft_fma((a), (b), (c))
+#define fma4(a, s, c) soft_fma4((a), (real4)(s), (c))
+#else
 #define fma4(a, s, c) fma((a), (real4)(s), (c))
+#endif
 
 /* The host passes the width that the device's registers like. */
 #ifndef QP_LANES

@@ -43,6 +43,8 @@ static void describe_device(cl_platform_id platform, uint32_t p, cl_device_id id
     info->has_double = doubles != 0;
     info->is_cpu = (type & CL_DEVICE_TYPE_CPU) != 0;
     info->rounds_correctly = (single & CL_FP_CORRECTLY_ROUNDED_DIVIDE_SQRT) != 0;
+    /* Simulators and some compilers for processors that do have fma say no to the first alone. */
+    info->slow_fma = (single & (CL_FP_FMA | CL_FP_DENORM)) == 0;
     info->compute_units = units;
     info->memory_bytes = memory;
     info->max_buffer_bytes = largest;

@@ -11,6 +11,7 @@ typedef struct qp_device_info {
     char id[32]; /* "P.D", or "host" */
     char name[256], platform[256], version[256];
     bool has_double, is_cpu, rounds_correctly; /* divides and takes roots in float correctly rounded */
+    bool slow_fma; /* has no fma in hardware, and its own program for it is to be avoided (kernels/real.h) */
     uint32_t compute_units;
     uint64_t memory_bytes, max_buffer_bytes;
 } qp_device_info;

@@ -80,10 +80,11 @@ static void write_options(const qp_device *device, qp_precision precision, uint3
     bool correct = device->info.rounds_correctly;
     snprintf(
         options, size,
-        "-cl-std=CL1.2%s%s -DQP_LANES=%u -DQP_WITH_INTERNAL=%d -DQP_WITH_CREASE=%d -DQP_WITH_TERMINAL=%d "
+        "-cl-std=CL1.2%s%s%s -DQP_LANES=%u -DQP_WITH_INTERNAL=%d -DQP_WITH_CREASE=%d -DQP_WITH_TERMINAL=%d "
         "-DQP_WITH_CORNERS=%d",
         correct ? " -cl-fp32-correctly-rounded-divide-sqrt -DQP_CORRECT_DIVIDE" : "",
         precision == QP_DOUBLE ? " -DQP_REAL_DOUBLE" : "",
+        precision == QP_FLOAT && device->info.slow_fma ? " -DQP_SOFT_FMA" : "",
         precision == QP_DOUBLE ? device->lanes_double : device->lanes_float,
         (plan_flags & QP_PLAN_INTERNAL) != 0, (plan_flags & QP_PLAN_CREASE) != 0,
         (plan_flags & QP_PLAN_TERMINAL) != 0, (plan_flags & QP_PLAN_CORNERS) != 0);
