@@ -204,7 +204,7 @@ qp_status qp_device_open(const char *which, qp_device **device, qp_error *err) {
         qp_device_free(d);
         return status;
     }
-    d->lanes_float = native_lanes(d, CL_DEVICE_NATIVE_VECTOR_WIDTH_FLOAT, 16);
+    d->lanes_float = d->info.slow_fma ? 1 : native_lanes(d, CL_DEVICE_NATIVE_VECTOR_WIDTH_FLOAT, 16);
     d->lanes_double = native_lanes(d, CL_DEVICE_NATIVE_VECTOR_WIDTH_DOUBLE, 8);
     d->items = number_from("QUADPLAN_GROUP_ITEMS", 1024, 0);
     *device = d;
