@@ -5,10 +5,18 @@
 
 #include <string.h>
 
+/* Cases that once were wrong, beyond the first ones: vertices on creases of non-manifold edges, fans beside them, Chaikin's rule
+ * over several fans. */
+static const struct {
+    const char *family;
+    uint32_t number;
+} special[] = {{"non-manifold", 69}, {"non-manifold", 154}, {"non-manifold", 312}, {"everything", 47},
+               {"everything", 67},   {"everything", 294},   {"far-scaled", 22}};
+
 static void one_family(const qp_stress_family *family, qp_device *device, qp_precision precision, int full) {
     qp_stress_report report = {0};
     qp_error err = {0};
-    const uint32_t most = CHECK_SANITIZED ? 2 : 12;
+    const uint32_t most = CHECK_SANITIZED ? 2 : 10;
     const uint32_t cases = full || family->cases < most ? family->cases : most;
     for (uint32_t number = 0; number < cases; ++number) {
         qp_stress_case tried;
@@ -26,7 +34,30 @@ static void one_family(const qp_stress_family *family, qp_device *device, qp_pre
     CHECK(report.nonfinite == 0);
     CHECK(report.normals_not_unit == 0);
     CHECK(report.past_depth == 0);
-    CHECK(report.worst_ulp <= 8);
+    /* In double the sums over fans of 2000 faces count (docs/stress.md). */
+    CHECK(report.worst_ulp <= (precision == QP_DOUBLE && strcmp(family->name, "valence") == 0 ? 40 : 8));
+}
+
+static void special_cases(qp_device *device, qp_precision precision) {
+    size_t count;
+    const qp_stress_family *families = qp_stress_families(&count);
+    for (size_t s = 0; s < sizeof special / sizeof special[0]; ++s) {
+        for (size_t i = 0; i < count; ++i) {
+            qp_stress_report report = {0};
+            qp_error err = {0};
+            qp_stress_case tried;
+            if (strcmp(families[i].name, special[s].family) != 0) continue;
+            if (!CHECK_OK(qp_stress_case_make(&families[i], special[s].number, 0, 100, &tried, &err), err))
+                continue;
+            CHECK_OK(
+                qp_stress_measure(&tried, special[s].number, device, precision, &report, NULL, NULL, &err),
+                err);
+            CHECK(report.samples == 100 && report.nonfinite == 0);
+            if (!CHECK(report.worst_ulp <= 8))
+                printf("%s %u: %g ulp\n", special[s].family, special[s].number, report.worst_ulp);
+            qp_stress_case_free(&tried);
+        }
+    }
 }
 
 /* The same case twice is the same case, and other seeds and numbers are others. */
@@ -92,6 +123,8 @@ int main(void) {
         one_family(&families[i], device, QP_FLOAT, full != NULL && full[0] == '1');
         one_family(&families[i], device, QP_DOUBLE, full != NULL && full[0] == '1');
     }
+    special_cases(device, QP_FLOAT);
+    special_cases(device, QP_DOUBLE);
     check_units(device);
     qp_device_free(device);
     return check_report();
