@@ -77,6 +77,26 @@ QP_FUNCTION real QP_NAME(size_of)(const QP_NAME(surface_point) * s) {
     return x + y + (fabs(s->p.z) + fabs(s->du.z) + fabs(s->dv.z));
 }
 
+/* Adds what points hold of a mode to what was made of the rest of them. Instead of du and dv both with their shares, which may leave
+ * nothing else of them, one goes without and is turned aside by the other (host/plan/mode.c, where that is derived). */
+QP_FUNCTION void QP_NAME(add_mode)(real4 mode, uint orders, QP_NAME(surface_point) * s) {
+    const real wu = s->du.w, wv = s->dv.w;
+    s->p = fma4(mode, s->p.w, s->p);
+    if (orders != 0) {
+        s->du = fma4(mode, wu, s->du);
+        s->dv = fma4(mode, wv, s->dv);
+    } else if (fabs(wu) >= fabs(wv)) {
+        if (wu == QP_R(0.0)) return;
+        s->skew_v = qp_div(wv, wu);
+        s->dv = fma4(s->du, -s->skew_v, s->dv);
+        s->du = fma4(mode, wu, s->du);
+    } else {
+        s->skew_u = qp_div(wu, wv);
+        s->du = fma4(s->dv, -s->skew_u, s->du);
+        s->dv = fma4(mode, wv, s->dv);
+    }
+}
+
 /* One row of points from number `slot` on. */
 QP_FUNCTION void QP_NAME(add_slots)(__global const real4 *support, __global const uint *ring, uint slot,
                                     int first, const real bu[4], const real du[4], real bv, real dv,
@@ -177,11 +197,10 @@ QP_FUNCTION void QP_NAME(eval_extraordinary)(__global const real4 *support, __gl
     /* Back to the level of the last ring, and what its points are scaled by. */
     s->level -= origin == QP_NO_POINT ? 1 : (int)rings;
     QP_NAME(eval_ring)(support, ring, u, v, orders, s);
+    if (orders == 0 && origin != QP_NO_POINT) s->size = QP_NAME(size_of)(s);
+    if (node[5] != QP_NO_POINT) QP_NAME(add_mode)(support[node[5]], orders, s);
     if (orders == 0) {
-        if (origin == QP_NO_POINT)
-            s->p = sub4(s->p, limit);
-        else
-            s->size = QP_NAME(size_of)(s);
+        if (origin == QP_NO_POINT) s->p = sub4(s->p, limit);
         s->p = fma4(s->p, shrink, limit);
     }
     if ((node[0] & QP_NODE_EXACT) == 0) s->flags |= QP_FLAG_PAST_DEPTH;
@@ -201,6 +220,7 @@ QP_FUNCTION void QP_NAME(eval_tree)(__global const uint *tree, __global const re
     s->flags = 0;
     s->level = 0;
     s->stretch = QP_R(1.0);
+    s->skew_u = s->skew_v = QP_R(0.0);
     s->size = QP_R(-1.0);
     for (;;) {
         const uint word = node[0], kind = QP_NODE_KIND(word);
@@ -226,9 +246,12 @@ QP_FUNCTION void QP_NAME(eval_tree)(__global const uint *tree, __global const re
             for (uint k = 0; k < rings; ++k, ring += 12, shrink *= QP_R(0.5)) {
                 if (QP_NAME(is_upper)(u, 1u) != 0 || QP_NAME(is_upper)(v, 1u) != 0) {
                     QP_NAME(eval_ring)(support, ring, u, v, orders, s);
-                    if (k < absolute || origin == QP_NO_POINT || orders != 0) return;
+                    if (k < absolute || origin == QP_NO_POINT) return;
+                    if (orders == 0) s->size = QP_NAME(size_of)(s);
+                    if ((word & QP_NODE_MODE) != 0)
+                        QP_NAME(add_mode)(support[(tree + node[2])[5]], orders, s);
+                    if (orders != 0) return;
                     s->level -= (int)k;
-                    s->size = QP_NAME(size_of)(s);
                     s->p = fma4(s->p, shrink, support[origin]);
                     return;
                 }
@@ -292,7 +315,7 @@ QP_FUNCTION void QP_NAME(replacement_start)(QP_NAME(replacement) * r) {
     const real4 zero = make4(QP_R(0.0), QP_R(0.0), QP_R(0.0));
     QP_NAME(surface_point) s;
     s.p = s.du = s.dv = zero;
-    s.size = s.stretch = QP_R(0.0);
+    s.size = s.stretch = s.skew_u = s.skew_v = QP_R(0.0);
     s.flags = s.turn = 0;
     s.level = 0;
     r->with_u = r->with_v = r->middle = s;
@@ -300,20 +323,22 @@ QP_FUNCTION void QP_NAME(replacement_start)(QP_NAME(replacement) * r) {
     r->found = 0;
 }
 
-/* Where step k evaluates, for a sample at (u,v) of the plan, and with which orders. False: not at all. */
-QP_FUNCTION int QP_NAME(replacement_place)(uint k, real *u, real *v, uint *orders) {
+/* Where step k evaluates, for a sample at (u,v) of the plan, and with which orders. False: not at all, which is so where a
+ * tessellation of this level lacks the points. */
+QP_FUNCTION int QP_NAME(replacement_place)(uint k, uint level, real *u, real *v, uint *orders) {
     *orders = k == 0 ? 1u : k == 1u ? 2u : 0u;
     if (k == 2u) *u = *v = QP_R(0.5);
-    return k <= 2u || QP_NAME(step_aside)(k - 3u, u, v);
+    return k <= 1u || (k == 2u && level >= 1u) || (k > 2u && level >= 3u && QP_NAME(step_aside)(k - 3u, u, v));
 }
 
 /* Takes up what step k found. */
 QP_FUNCTION void QP_NAME(replacement_take)(uint k, QP_NAME(surface_point) s, real u, real v, real size,
                                            QP_NAME(replacement) * r) {
     if (k == 0) r->with_u = s;
-    if (k == 1u) r->with_v = s;
-    if (k == 2u) {
-        r->middle = s;
+    if (k == 2u) r->middle = s;
+    if (k == 1u) {
+        r->with_v = s;
+        r->middle.du = r->middle.dv = make4(QP_R(0.0), QP_R(0.0), QP_R(0.0));
         r->found = ((r->with_u.flags | r->with_v.flags) & (QP_FLAG_LIMIT_FRAME | QP_FLAG_PAST_DEPTH)) == 0 &&
                    QP_NAME(normal_from_within)(u, v, r->with_u, r->with_v, size, &r->normal);
     }
@@ -348,7 +373,7 @@ __kernel void QP_NAME(domain)(__global const uint *heads, __global const uint *t
     const real4 origin = make4(base[0], base[1], base[2]);
     const ulong out = QP_ENTRY_WIDE(entry, QP_ENTRY_OUT);
     const uint rotation = entry[QP_ENTRY_ROTATION];
-    const uint samples = entry[QP_ENTRY_SAMPLES];
+    const uint samples = entry[QP_ENTRY_SAMPLES], level = entry[QP_ENTRY_LEVEL];
 
     real size = QP_R(0.0);
     for (uint j = 1; j < head[QP_HEAD_RING]; ++j) {
@@ -382,9 +407,13 @@ __kernel void QP_NAME(domain)(__global const uint *heads, __global const uint *t
             QP_NAME(rotate_uv)(rotation, &u, &v);
             real at_u = u, at_v = v;
             uint orders = 0;
-            const int there = is_sample || QP_NAME(replacement_place)(k, &at_u, &at_v, &orders);
-            s.turn = is_sample ? rotation : 0u;
-            if (there) QP_NAME(eval_tree)(tree, constants, points, at_u, at_v, orders, &s);
+            const int there = is_sample || QP_NAME(replacement_place)(k, level, &at_u, &at_v, &orders);
+            if (there) {
+                s.turn = is_sample ? rotation : 0u;
+                QP_NAME(eval_tree)(tree, constants, points, at_u, at_v, orders, &s);
+            } else {
+                s = replacement.middle;
+            }
             if (!is_sample) {
                 const ulong at = out + i + l;
                 if (there) QP_NAME(replacement_take)(k, s, u, v, value[9][l], &replacement);
@@ -406,7 +435,7 @@ __kernel void QP_NAME(domain)(__global const uint *heads, __global const uint *t
             flag[l] = s.flags;
             if (want_derivatives != 0)
                 QP_NAME(write_derivatives)
-            (derivatives + 6u * (out + i + l), s.du, s.dv, s.turn,
+            (derivatives + 6u * (out + i + l), fma4(s.dv, s.skew_u, s.du), fma4(s.du, s.skew_v, s.dv), s.turn,
              s.stretch * ldexp(positions[QP_POSITION_SCALE], s.level));
             if (e + 1u != block) continue;
             lanes p[3], du[3], dv[3];

@@ -11,6 +11,7 @@
 #define QP_ENTRY_SUPPORT 6u  /* 64 bits: first point in the support buffer */
 #define QP_ENTRY_GRID 8u     /* 64 bits: first (u,v) in the grid */
 #define QP_ENTRY_OUT 10u     /* 64 bits: first sample in the vertex buffer */
+#define QP_ENTRY_LEVEL 12u   /* the level of the tessellation, whose points are made: rows[level] */
 #define QP_ENTRY_WORDS 16u   /* a cache line */
 
 #define QP_ENTRY_WIDE(e, word) ((ulong)(e)[word] | (ulong)(e)[(word) + 1u] << 32)

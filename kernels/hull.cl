@@ -2,7 +2,7 @@
  *
  *   support[i] = sum over ring vertices j of weight[j][i] * (position[ring[j]] - position[ring[0]])
  *
- * for the entry's first `rows` points i, 4 reals a point (x, y, z, 0). Each work-item takes blocks of
+ * for the entry's first `rows` points i, 4 reals a point (x, y, z, and its share in a mode, plan_layout.h). Each work-item takes blocks of
  * QP_LANES neighbouring points, whose weights lie side by side. The ring goes through local memory in chunks,
  * for it may be of any size. Sums run in ring order, in parts of QP_HULL_PART vertices that start at 0 and are then added up:
  * the error of a sum of n terms grows with n/part + part instead of n, which counts at valences in the thousands. Chunks are
@@ -28,6 +28,7 @@ __kernel void QP_NAME(hull)(__global const uint *heads, __global const real *rea
     const uint rows = entry[QP_ENTRY_ROWS];
     const uint ring_size = head[QP_HEAD_RING];
     const ulong points = head[QP_HEAD_POINTS];
+    const int shares = (head[QP_HEAD_FLAGS] & QP_PLAN_MODES) != 0;
     __global const real *weights = reals + head[QP_HEAD_REALS];
     __global const real *vertices = positions + QP_POSITION_FIRST;
     __global const real *origin = vertices + 3u * (ulong)ring[0];
@@ -83,7 +84,7 @@ __kernel void QP_NAME(hull)(__global const uint *heads, __global const real *rea
                 p[0] = spill[0][l];
                 p[1] = spill[1][l];
                 p[2] = spill[2][l];
-                p[3] = QP_R(0.0);
+                p[3] = shares ? weights[ring_size * points + i + l] : QP_R(0.0);
             }
         }
     }

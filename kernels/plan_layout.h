@@ -40,6 +40,7 @@
 #define QP_PLAN_INTERNAL 8u /* has internal nodes */
 #define QP_PLAN_CORNERS 16u /* has extraordinary or irregular leaves */
 #define QP_PLAN_IRREGULAR 32u /* has irregular leaves */
+#define QP_PLAN_MODES 64u /* has points with shares in modes: behind the weights come P reals, the points' fourth numbers */
 
 /* Word 0 of a node: kind in bits 0..2, rotation in bits 3..4 (crease, terminal, extraordinary), tie_u in bit 5,
  * tie_v in bit 6 (internal); of a terminal the count of its rings in bits 8..15 and in bits 16..23 how many of them,
@@ -67,7 +68,9 @@
  *   (relative to QP_HEAD_REALS) of the ratio r by which the rings shrink in the end. A sample elsewhere in the cell goes on
  *   doubling, m times until u >= .5 or v >= .5, and is limit + r^m (p - limit), p the last ring's value there (Stam 1998: the
  *   powers of the dominant eigenvalue). That is exact to working precision where QP_NODE_EXACT is set, and past the plan's depth
- *   elsewhere: modes that decay a little faster than the dominant one still count after few levels.
+ *   elsewhere: modes that decay a little faster than the dominant one still count after few levels. word 5: the terminal's mode, or
+ *   QP_NO_POINT. With QP_NODE_MODE set in the terminal, to every one of its offset points its fourth number times the mode is to be
+ *   added (host/plan/mode.c).
  * IRREGULAR: words 1..6: 12 points: limit position, t1, t2 of the corners (0,0), (1,0), (1,1), (0,1), QP_NO_POINT
  *   where a tangent is undefined. Exact at the corners; elsewhere past depth: bilinear blend. */
 #define QP_NODE_INTERNAL 0u
@@ -84,6 +87,7 @@
 #define QP_NODE_RINGS(w) (((w) >> 8) & 255u)
 #define QP_NODE_ABSOLUTE_RINGS(w) (((w) >> 16) & 255u)
 #define QP_NODE_EXACT (1u << 8) /* extraordinary */
+#define QP_NODE_MODE (1u << 24) /* terminal */
 
 #define QP_NO_POINT 0xffffu
 #define QP_CREASE_REALS 53u

@@ -18,14 +18,14 @@ QP_FUNCTION void QP_NAME(eval_points)(real point[3][16], real u, real v, uint u_
 }
 
 /* replace_normal() of domain.cl, for these points. */
-QP_FUNCTION void QP_NAME(replace_regular_normal)(real point[3][16], real u, real v, real size,
+QP_FUNCTION void QP_NAME(replace_regular_normal)(real point[3][16], real u, real v, real size, uint level,
                                                  __global real *normal, __global uchar *flag) {
     QP_NAME(surface_point) with_u, with_v, middle, s;
     real4 n = make4(QP_R(0.0), QP_R(0.0), QP_R(0.0));
     QP_NAME(eval_points)(point, u, v, 1u, 0u, &with_u);
     QP_NAME(eval_points)(point, u, v, 0u, 1u, &with_v);
     int found = QP_NAME(normal_from_within)(u, v, with_u, with_v, size, &n);
-    for (uint k = 0; k < 4u && found != 0; ++k) {
+    for (uint k = 0; k < 4u && found != 0 && level >= 3u; ++k) {
         real at_u = u, at_v = v;
         if (QP_NAME(step_aside)(k, &at_u, &at_v) == 0) continue;
         QP_NAME(eval_points)(point, at_u, at_v, 0u, 0u, &s);
@@ -35,6 +35,7 @@ QP_FUNCTION void QP_NAME(replace_regular_normal)(real point[3][16], real u, real
         *flag &= (uchar)~QP_FLAG_NO_NORMAL;
     } else {
         QP_NAME(eval_points)(point, QP_R(0.5), QP_R(0.5), 0u, 0u, &middle);
+        if (level == 0) middle.du = middle.dv = make4(QP_R(0.0), QP_R(0.0), QP_R(0.0));
         n = QP_NAME(stand_in_normal)(middle, size);
     }
     normal[0] = n.x + QP_R(0.0);
@@ -105,7 +106,7 @@ __kernel void QP_NAME(regular)(__global const uint *rings, __global const real *
             for (uint l = 0; l < block; ++l) {
                 if ((flag[l] & QP_FLAG_NO_NORMAL) != 0)
                     QP_NAME(replace_regular_normal)
-                (point, at[0][l], at[1][l], size, vertices + 6u * (out + i + l) + 3u, flags + (out + i + l));
+                (point, at[0][l], at[1][l], size, entry[QP_ENTRY_LEVEL], vertices + 6u * (out + i + l) + 3u, flags + (out + i + l));
             }
         }
         if (want_derivatives != 0)

@@ -51,7 +51,8 @@ typedef struct QP_NAME(surface_point) {
     real4 p, du, dv;
     real
         size; /* of the numbers that p, du and dv were made from, which tells their rounding; < 0: the patch's */
-    real skew_u, skew_v; /* du and dv are without skew_u dv and skew_v du: same cross product (one of the two is 0) */
+    real skew_u,
+        skew_v; /* du and dv are without skew_u dv and skew_v du: same cross product (one of the two is 0) */
     uint flags;
     int level; /* the leaf is 2^-level of the patch, or would be, were its points not stored times a power of two */
     real stretch; /* factor left out of du and dv, which are to be multiplied by it */
@@ -272,7 +273,8 @@ QP_FUNCTION int QP_NAME(write_samples)(__global real *vertices, __global uchar *
     const real first[3] = {origin.x, origin.y, origin.z};
     for (uint c = 0; c < 3u; ++c) {
         const lanes at = add_lanes(splat(first[c]), p[c]), rest = splat(positions[QP_POSITION_REST + c]);
-        store_lanes(add_lanes(fma_lanes(at, scale, rest), splat(positions[QP_POSITION_CENTRE + c])), result[c]);
+        store_lanes(add_lanes(fma_lanes(at, scale, rest), splat(positions[QP_POSITION_CENTRE + c])),
+                    result[c]);
     }
     for (uint c = 0; c < 3u; ++c) store_lanes(mul_lanes(n[c], inverse), result[3u + c]);
     const lanes noise = mul_lanes(splat(QP_NOISE), size);

@@ -7,7 +7,7 @@
 #include "host/plan/plan.h"
 
 /* What a point is; kept beside the plan for `info`, which tells distinct points of a mesh apart. */
-enum { QP_POINT_REFINED, QP_POINT_LIMIT, QP_POINT_TANGENT };
+enum { QP_POINT_REFINED, QP_POINT_LIMIT, QP_POINT_TANGENT, QP_POINT_MODE };
 
 /* Final points of the points of a level, QP_NONE where there is none yet. */
 typedef struct qp_final_table {

@@ -277,7 +277,14 @@ void qp_plan_put_tail(qp_builder *b, uint32_t level, qp_item *item) {
     add_tail_rings(b, level, item, chain, out[0]);
     if (b->failed || b->too_large) return;
     item->parent_word = put_terminal(b, chain, out[0]);
-    uint32_t node = qp_plan_new_node(b, 5);
+    if (b->failed) return;
+    const uint32_t mode = qp_plan_split_mode(b, chain, level);
+    if (b->failed || b->too_large) return;
+    if (mode != QP_NO_POINT) {
+        b->flags |= QP_PLAN_MODES;
+        b->tree[item->parent_word - 2] |= QP_NODE_MODE;
+    }
+    uint32_t node = qp_plan_new_node(b, 6);
     b->constants = qp_plan_grown(b, b->constants, &b->constant_capacity, (size_t)b->constant_count + 1,
                                  sizeof *b->constants);
     if (b->failed) return;
@@ -285,6 +292,7 @@ void qp_plan_put_tail(qp_builder *b, uint32_t level, qp_item *item) {
     b->tree[node] = QP_NODE_EXTRAORDINARY | corner << 3 | (b->depth == QP_DEPTH_LIMIT ? QP_NODE_EXACT : 0u);
     for (uint32_t k = 0; k < 3; ++k) b->tree[node + 1 + k] = out[k];
     b->tree[node + 4] = b->constant_count;
+    b->tree[node + 5] = mode;
     b->constants[b->constant_count++] = tail_ratio(b, &b->chains[item->chain]);
     qp_plan_link_node(b, item, node);
 }

@@ -29,7 +29,7 @@ static void renumber_tree(qp_plan *plan, const uint32_t *index) {
             at += 5;
             break;
         case QP_NODE_CREASE:
-            node[10] += plan->point_count * plan->ring_size; /* fall through */
+            node[10] += qp_plan_first_constant(plan); /* fall through */
         case QP_NODE_REGULAR:
             renumber_word(node + 1, index);
             renumber(node + 2, 8, index);
@@ -42,8 +42,9 @@ static void renumber_tree(qp_plan *plan, const uint32_t *index) {
             break;
         case QP_NODE_EXTRAORDINARY:
             for (uint32_t k = 1; k < 4; ++k) renumber_word(node + k, index);
-            node[4] += plan->point_count * plan->ring_size;
-            at += 5;
+            renumber_word(node + 5, index);
+            node[4] += qp_plan_first_constant(plan);
+            at += 6;
             break;
         default:
             renumber(node + 1, 6, index);
@@ -64,10 +65,12 @@ qp_plan *qp_plan_finish(qp_builder *b) {
         plan->point_kinds = qp_alloc(count, 1, false);
         plan->point_origins = qp_alloc(count, sizeof *plan->point_origins, false);
         plan->point_scales = qp_alloc(count, 1, false);
+        plan->point_modes = qp_alloc(count, sizeof *plan->point_modes, false);
+        plan->point_shares = qp_alloc(count, sizeof *plan->point_shares, false);
     }
     if (plan == NULL || index == NULL || plan->tree == NULL || plan->weights == NULL ||
         plan->constants == NULL || plan->point_kinds == NULL || plan->point_origins == NULL ||
-        plan->point_scales == NULL) {
+        plan->point_scales == NULL || plan->point_modes == NULL || plan->point_shares == NULL) {
         free(index);
         qp_plan_free(plan);
         b->failed = true;
@@ -90,12 +93,15 @@ qp_plan *qp_plan_finish(qp_builder *b) {
         index[p->order] = i;
         plan->point_kinds[i] = p->kind;
         plan->point_scales[i] = p->scale;
+        plan->point_shares[i] = p->share;
         memcpy(plan->weights + (size_t)i * width, qp_plan_final_row(b, p->order), width * sizeof(double));
         for (uint32_t n = p->need; n < QP_LEVELS; ++n) ++plan->rows[n];
     }
     for (uint32_t i = 0; i < count; ++i) {
         uint16_t origin = b->points[i].origin;
+        uint16_t mode = b->points[i].mode;
         plan->point_origins[i] = origin == QP_NO_POINT ? origin : (uint16_t)index[origin];
+        plan->point_modes[i] = mode == QP_NO_POINT ? mode : (uint16_t)index[mode];
     }
     plan->rows[QP_LEVELS - 1] = count;
     renumber_tree(plan, index);

@@ -28,8 +28,9 @@ typedef struct qp_fan {
     /* The vertex lies on a crease of two non-manifold edges and is no corner for ever. An open fan starts at end 0 and ends at
      * end 1, or else lies `beside` the crease, as closed ones do: its own edges tell less than these. */
     bool through, beside;
-    uint32_t end[2];    /* far points of the two edges */
-    uint32_t others;    /* sharp edges of the vertex in its other fans, those two apart; counted where they have a say */
+    uint32_t end[2]; /* far points of the two edges */
+    uint32_t
+        others; /* sharp edges of the vertex in its other fans, those two apart; counted where they have a say */
     float *other_sharp; /* [others] */
 } qp_fan;
 

@@ -1,39 +1,40 @@
 /* Plans as a device reads them (kernels/plan_layout.h). */
 #include "host/plan/plan.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* Weights this much below their row's largest change nothing in float, and might be denormal numbers, which some devices flush. */
-static double smallest_weight(const double *row, uint32_t width) {
-    double largest = 0.0;
-    for (uint32_t j = 0; j < width; ++j) largest = fmax(largest, fabs(row[j]));
-    return largest * 0x1p-60;
+/* What is left of row i without its mode, in `rest`, and otherwise the row. */
+static const double *row_rest(const qp_plan *plan, uint32_t i, double *rest) {
+    const double *row = plan->weights + (size_t)i * plan->ring_size;
+    if ((plan->flags & QP_PLAN_MODES) == 0 || plan->point_modes[i] == QP_NO_POINT) return row;
+    const double *mode = plan->weights + (size_t)plan->point_modes[i] * plan->ring_size;
+    for (uint32_t j = 0; j < plan->ring_size; ++j) rest[j] = row[j] - plan->point_shares[i] * mode[j];
+    return rest;
 }
 
-static void pack_reals(const qp_plan *plan, qp_precision precision, void *reals, size_t at) {
-    uint32_t rows = plan->point_count, width = plan->ring_size;
+static void put_real(qp_precision precision, void *reals, size_t at, double x) {
+    if (precision == QP_DOUBLE)
+        ((double *)reals)[at] = x;
+    else /* some devices flush denormal numbers; weights that small change nothing beside the others */
+        ((float *)reals)[at] = fabs(x) < (double)FLT_MIN ? 0.0f : (float)x;
+}
+
+/* rest: scratch, [ring_size]. */
+static void pack_reals(const qp_plan *plan, qp_precision precision, void *reals, size_t at, double *rest) {
+    const uint32_t rows = plan->point_count, width = plan->ring_size;
     for (uint32_t i = 0; i < rows; ++i) {
-        const double *row = plan->weights + (size_t)i * width, scale = ldexp(1.0, plan->point_scales[i]);
-        const double smallest = smallest_weight(row, width);
-        for (uint32_t j = 0; j < width; ++j) {
-            size_t to = at + (size_t)j * rows + i;
-            if (precision == QP_DOUBLE) {
-                ((double *)reals)[to] = row[j] * scale;
-            } else {
-                ((float *)reals)[to] = fabs(row[j]) < smallest ? 0.0f : (float)(row[j] * scale);
-            }
-        }
+        const double *row = row_rest(plan, i, rest), scale = ldexp(1.0, plan->point_scales[i]);
+        for (uint32_t j = 0; j < width; ++j)
+            put_real(precision, reals, at + (size_t)j * rows + i, row[j] * scale);
+        if ((plan->flags & QP_PLAN_MODES) != 0)
+            put_real(precision, reals, at + (size_t)width * rows + i, plan->point_shares[i] * scale);
     }
-    at += (size_t)rows * width;
-    for (uint32_t c = 0; c < plan->constant_count; ++c) {
-        if (precision == QP_DOUBLE) {
-            ((double *)reals)[at + c] = plan->constants[c];
-        } else {
-            ((float *)reals)[at + c] = (float)plan->constants[c];
-        }
-    }
+    at += qp_plan_first_constant(plan);
+    for (uint32_t c = 0; c < plan->constant_count; ++c)
+        put_real(precision, reals, at + c, plan->constants[c]);
 }
 
 static void pack_head(const qp_plan *plan, size_t tree, size_t reals, uint32_t *head) {
@@ -47,13 +48,15 @@ static void pack_head(const qp_plan *plan, size_t tree, size_t reals, uint32_t *
 
 qp_status qp_surface_pack(const qp_surface *const *surfaces, uint32_t n_surfaces, qp_precision precision,
                           qp_plan_pack *pack, qp_error *err) {
+    uint32_t widest = 0;
     *pack = (qp_plan_pack){0};
     for (uint32_t s = 0; s < n_surfaces; ++s) {
         pack->head_words += (size_t)surfaces[s]->n_plans * QP_HEAD_WORDS;
         for (uint32_t p = 0; p < surfaces[s]->n_plans; ++p) {
             const qp_plan *plan = surfaces[s]->plans[p];
             pack->tree_words += plan->tree_words;
-            pack->real_count += (size_t)plan->point_count * plan->ring_size + plan->constant_count;
+            if (plan->ring_size > widest) widest = plan->ring_size;
+            pack->real_count += (size_t)qp_plan_first_constant(plan) + plan->constant_count;
         }
     }
     if (pack->tree_words > UINT32_MAX || pack->real_count > UINT32_MAX) {
@@ -64,7 +67,9 @@ qp_status qp_surface_pack(const qp_surface *const *surfaces, uint32_t n_surfaces
     pack->heads = qp_alloc(pack->head_words, sizeof(uint32_t), true);
     pack->tree = qp_alloc(pack->tree_words, sizeof(uint32_t), false);
     pack->reals = qp_alloc(pack->real_count, real_size, false);
-    if (pack->heads == NULL || pack->tree == NULL || pack->reals == NULL) {
+    double *rest = qp_alloc(widest, sizeof *rest, false);
+    if (pack->heads == NULL || pack->tree == NULL || pack->reals == NULL || rest == NULL) {
+        free(rest);
         free(pack->heads);
         free(pack->tree);
         free(pack->reals);
@@ -79,10 +84,11 @@ qp_status qp_surface_pack(const qp_surface *const *surfaces, uint32_t n_surfaces
             const qp_plan *plan = surfaces[s]->plans[p];
             pack_head(plan, tree, reals, head);
             memcpy(pack->tree + tree, plan->tree, plan->tree_words * sizeof *plan->tree);
-            pack_reals(plan, precision, pack->reals, reals);
+            pack_reals(plan, precision, pack->reals, reals, rest);
             tree += plan->tree_words;
-            reals += (size_t)plan->point_count * plan->ring_size + plan->constant_count;
+            reals += (size_t)qp_plan_first_constant(plan) + plan->constant_count;
         }
     }
+    free(rest);
     return QP_OK;
 }

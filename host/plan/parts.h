@@ -1,4 +1,4 @@
-/* What the parts of plan building share: points.c (final points and the level that needs them), chain.c (terminal nodes), build.c (the
+/* What the parts of plan building share: points.c (final points and the level that needs them), chain.c (terminal nodes), mode.c (their slivers), build.c (the
  * quadtree), finish.c (sorting and numbering). Builders fail by setting builder->failed or too_large; what they return then is of
  * no use. */
 #ifndef QP_PLAN_PARTS_H
@@ -14,7 +14,9 @@ typedef struct qp_final_point {
     uint8_t kind;    /* QP_POINT_* | depth << 2 */
     uint16_t origin; /* point its row is an offset from, or QP_NO_POINT */
     uint8_t scale;   /* a device gets 2^scale times the row */
-    uint32_t order;  /* becomes its index once sorted */
+    uint16_t mode;   /* point of which the row holds `share` (mode.c), or QP_NO_POINT */
+    double share;
+    uint32_t order; /* becomes its index once sorted */
 } qp_final_point;
 
 /* One dimension of a cell: [lo, hi], and whether a sample at either end comes here or goes on. */
@@ -86,6 +88,9 @@ void qp_plan_close_chain(qp_builder *b, qp_item *item);
 /* The chain's corner is extraordinary for good: all its other rings to the plan's depth, and its end. */
 bool qp_plan_is_permanent(const qp_builder *b, uint32_t level, const qp_item *item);
 void qp_plan_put_tail(qp_builder *b, uint32_t level, qp_item *item);
+
+/* mode.c: splits the rings of a chain that has an origin, where they tend to one vector. The point of that vector, or QP_NO_POINT. */
+uint32_t qp_plan_split_mode(qp_builder *b, const qp_chain *chain, uint32_t level);
 
 /* finish.c */
 qp_plan *qp_plan_finish(qp_builder *b);

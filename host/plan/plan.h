@@ -15,9 +15,17 @@ typedef struct qp_plan {
     uint8_t *point_kinds;     /* [point_count] what each point is (host/plan/build.h), for info */
     uint16_t *point_origins;  /* [point_count] point that a row is an offset from, or QP_NO_POINT */
     uint8_t *point_scales;    /* [point_count] a device gets 2^scale times the row (exact) */
-    double *constants;        /* [constant_count]; nodes hold index + point_count * ring_size */
-    uint32_t depth;           /* deepest level stored; less than asked for where that took too many points */
+    uint16_t *
+        point_modes; /* [point_count] NULL, or the point of which a row holds point_shares[i] (mode.c), or QP_NO_POINT */
+    double *point_shares;
+    double *constants; /* [constant_count]; nodes hold index + qp_plan_first_constant() */
+    uint32_t depth;    /* deepest level stored; less than asked for where that took too many points */
 } qp_plan;
+
+/* Where constants begin in a plan's reals. */
+static inline uint32_t qp_plan_first_constant(const qp_plan *plan) {
+    return plan->point_count * (plan->ring_size + ((plan->flags & QP_PLAN_MODES) != 0 ? 1u : 0u));
+}
 
 struct qp_surface {
     const qp_mesh *mesh;

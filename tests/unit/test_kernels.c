@@ -100,6 +100,7 @@ static void terminal(wide x, wide y, wide size, uint32_t r, uint32_t rings, uint
     hand_word(&plan, dv);
     hand_word(&plan, 0); /* offset of the ratio, once all points are known */
     tail_word = plan.plan.tree_words - 1;
+    hand_word(&plan, QP_NO_POINT); /* no mode */
     plan.constants[plan.plan.constant_count++] = 0.5;
 }
 

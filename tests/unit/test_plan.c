@@ -32,7 +32,7 @@ static double row_sum(const qp_plan *plan, uint32_t i) {
 static void check_rows(const qp_plan *plan) {
     for (uint32_t i = 0; i < plan->point_count; ++i) {
         bool offset = plan->point_origins[i] != QP_NO_POINT;
-        bool tangent = (plan->point_kinds[i] & 3u) == 2;
+        bool tangent = (plan->point_kinds[i] & 3u) >= 2; /* or a mode */
         CHECK_NEAR(row_sum(plan, i), offset || tangent ? 0.0 : 1.0, 2e-12);
     }
     for (uint32_t n = 1; n < QP_LEVELS; ++n) CHECK(plan->rows[n] >= plan->rows[n - 1]);

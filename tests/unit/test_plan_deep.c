@@ -63,7 +63,7 @@ static void check_ratio(uint32_t valence) {
             const uint32_t *end = end_of(plan);
             CHECK((plan->flags & QP_PLAN_IRREGULAR) == 0);
             if (end == NULL) continue;
-            const double ratio = plan->constants[end[4] - plan->point_count * plan->ring_size];
+            const double ratio = plan->constants[end[4] - qp_plan_first_constant(plan)];
             CHECK(((end[0] & QP_NODE_EXACT) != 0) == (depths[d] == QP_DEPTH_LIMIT));
             /* The fan's outer vertices have other valences. */
             if (fabs(ratio - dominant(valence)) < (depths[d] == QP_DEPTH_LIMIT ? 1e-7 : 1e-2)) ++found;
