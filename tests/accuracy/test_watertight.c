@@ -258,21 +258,15 @@ static void check_points(const qp_mesh *mesh, qp_precision precision, qp_random 
             }
             CHECK(bad == 0);
             sum.samples += n;
-            /* Evaluated apart from each other they are the same still. */
+            /* And again after others, which may have made deeper plans of other patches. */
             char *kept = malloc(2 * part * (n + 1));
+            const uint64_t half = n / 2;
             if (CHECK(kept != NULL) && n != 0) {
                 memcpy(kept, stream.vertices, 2 * part * n);
-                bad = 0;
-                for (size_t i = 0; i < n / 2; ++i) {
-                    patch[i] = patch[2 * i + 1];
-                    memcpy(uv + 2 * i, uv + 2 * (2 * i + 1), 2 * sizeof *uv);
-                }
-                if (CHECK_OK(qp_frame_eval_points(frame, n / 2, patch, uv, &stream, &err), err)) {
-                    for (size_t i = 0; i < n / 2; ++i)
-                        bad += memcmp(kept + 2 * part * (2 * i + 1),
-                                      (const char *)stream.vertices + 2 * part * i, 2 * part) != 0;
-                }
-                CHECK(bad == 0);
+                if (CHECK_OK(qp_frame_eval_points(frame, half, patch + half, uv + 2 * half, &stream, &err),
+                             err) &&
+                    CHECK_OK(qp_frame_eval_points(frame, n, patch, uv, &stream, &err), err))
+                    CHECK(memcmp(kept, stream.vertices, 2 * part * n) == 0);
             }
             free(kept);
         }
