@@ -62,7 +62,7 @@ static void print_family(const char *name, const qp_stress_report *r, const char
 }
 
 static void print_json(qp_json *json, const char *name, const qp_stress_report *r, const char *command,
-                       const char *normal_command) {
+                       const char *normal_command, const char *missing_command) {
     qp_json_open_object(json, NULL);
     qp_json_text(json, "name", name);
     qp_json_integer(json, "cases", r->cases);
@@ -74,6 +74,7 @@ static void print_json(qp_json *json, const char *name, const qp_stress_report *
     qp_json_text(json, "normal_command", normal_command);
     qp_json_integer(json, "no_normal", r->no_normal);
     qp_json_integer(json, "normals_missing", r->normals_missing);
+    qp_json_text(json, "missing_command", missing_command);
     qp_json_integer(json, "normals_not_unit", r->normals_not_unit);
     qp_json_integer(json, "normals_ill", r->normals_ill);
     qp_json_integer(json, "past_depth", r->past_depth);
@@ -98,13 +99,15 @@ static qp_status run_family(const qp_stress_family *family, const stress_options
             return qp_fail(err, status, "%s, case %" PRIu64 ": %s", family->name, number, inner.message);
         }
     }
-    char command[512], normal_command[512];
+    char command[512], normal_command[512], missing_command[512];
     command_of(family->name, o, &report.worst, report.worst_ulp > 0 || report.nonfinite > 0, command,
                sizeof command);
     command_of(family->name, o, &report.worst_normal, report.worst_normal_deg > 0, normal_command,
                sizeof normal_command);
+    command_of(family->name, o, &report.missing, report.normals_missing > 0, missing_command,
+               sizeof missing_command);
     if (o->json)
-        print_json(json, family->name, &report, command, normal_command);
+        print_json(json, family->name, &report, command, normal_command, missing_command);
     else
         print_family(family->name, &report, command);
     *nonfinite += report.nonfinite;
@@ -178,7 +181,7 @@ static qp_status run_sample(const qp_stress_family *family, const stress_options
         command_of(family->name, o, &report.worst, report.samples > 0, command, sizeof command);
         qp_json_begin(&json, stdout);
         qp_json_open_array(&json, "families");
-        print_json(&json, family->name, &report, command, command);
+        print_json(&json, family->name, &report, command, command, report.normals_missing > 0 ? command : "");
         qp_json_finish(&json);
     }
     if (status == QP_OK && report.nonfinite > 0)

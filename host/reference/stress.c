@@ -204,7 +204,7 @@ static void add_sample(qp_stress_report *report, const qp_stress_sample *r, bool
         report->worst_ulp = r->ulp;
         if (report->nonfinite == 0) report->worst = *r;
     }
-    report->normals_missing += flagged && well;
+    if (flagged && well && report->normals_missing++ == 0) report->missing = *r;
     report->normals_ill += !flagged && defined && !well;
     if (!defined || !well || flagged || r->normal_deg <= report->worst_normal_deg) return;
     report->worst_normal_deg = r->normal_deg;

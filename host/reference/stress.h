@@ -69,6 +69,7 @@ typedef struct qp_stress_report {
     double worst_ulp;
     double worst_normal_deg;              /* over the well-conditioned that are not flagged */
     qp_stress_sample worst, worst_normal; /* of the first sample that is not finite, else of worst_ulp */
+    qp_stress_sample missing;             /* the first of normals_missing */
 } qp_stress_report;
 
 /* Evaluates the case in frames on the device and adds to *report, which starts zeroed. each, unless NULL, is called with every

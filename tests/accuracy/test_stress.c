@@ -16,9 +16,11 @@ static const struct {
 static void one_family(const qp_stress_family *family, qp_device *device, qp_precision precision, int full) {
     qp_stress_report report = {0};
     qp_error err = {0};
-    const uint32_t most = CHECK_SANITIZED ? 2 : 10;
+    const uint32_t most = CHECK_SANITIZED ? 3 : 10;
     const uint32_t cases = full || family->cases < most ? family->cases : most;
-    for (uint32_t number = 0; number < cases; ++number) {
+    /* Fans of 2000 faces, number 1, take seconds: in one precision. */
+    const uint32_t first = precision == QP_DOUBLE && !full ? 2 : 0;
+    for (uint32_t number = first; number < cases; ++number) {
         qp_stress_case tried;
         const uint64_t samples = full ? 1000 : CHECK_SANITIZED ? 20 : 40;
         if (!CHECK_OK(qp_stress_case_make(family, number, 0, samples, &tried, &err), err)) return;
@@ -29,8 +31,8 @@ static void one_family(const qp_stress_family *family, qp_device *device, qp_pre
            family->name, precision == QP_DOUBLE ? "double" : "float", (unsigned long long)report.samples,
            report.worst_ulp, report.worst.number, report.worst.patch, report.worst.uv[0], report.worst.uv[1],
            report.worst_normal_deg);
-    CHECK(report.cases == cases);
-    CHECK(report.samples > 0);
+    CHECK(report.cases == (cases > first ? cases - first : 0));
+    CHECK(report.samples > 0 || cases <= first);
     CHECK(report.nonfinite == 0);
     CHECK(report.normals_not_unit == 0);
     CHECK(report.past_depth == 0);
