@@ -33,9 +33,10 @@ static inline int measure(const qp_surface *surface, qp_device *device, qp_preci
 
 /* The bounds of issue and README: of the diagonal, degrees. */
 static inline int within_bounds(const qp_error_report *r, qp_precision precision) {
-    double position = precision == QP_DOUBLE ? 1e-12 : 1e-6, normal = precision == QP_DOUBLE ? 1e-4 : 0.05;
+    double position = precision == QP_DOUBLE ? 1e-13 : 3e-7, normal = precision == QP_DOUBLE ? 1e-4 : 0.01;
     int good = CHECK(r->position_max <= position);
     good = CHECK(r->normal_max_deg <= normal) && good;
+    good = CHECK(r->past_depth == 0) && good;
     return CHECK(r->nonfinite == 0) && good;
 }
 
