@@ -104,7 +104,7 @@ def draw_panel(axes, result, key, label):
     axes.yaxis.set_minor_locator(matplotlib.ticker.NullLocator())
     axes.grid(True, color="#dddddd", linewidth=0.5, zorder=1)
     axes.set_axisbelow(True)
-    axes.set_xlabel("time, ns a sample")
+    axes.set_xlabel("processor time of all threads, ns a sample" if result["clock"] == "processor" else "time, ns a sample")
     axes.set_ylabel(label)
     return used
 

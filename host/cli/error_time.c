@@ -75,6 +75,7 @@ static qp_status check_outputs(const et_options *o, qp_error *err) {
 static qp_status run_error_time(int argc, char **argv, qp_error *err) {
     et_options o = {
         .samples = 64, .repeats = 7, .max_level = ET_MOST_LEVEL, .memory_mb = 4096, .setup_limit_ms = 5000};
+    int clock = 0;
     const cli_option options[] = {
         {"--samples", "N", "in each patch (default 64)", CLI_COUNT, &o.samples, 1, 65536, NULL},
         {"--seed", "N", "of the samples (default 0)", CLI_COUNT, &o.seed, 0, 18446744073709551615.0, NULL},
@@ -86,6 +87,9 @@ static qp_status run_error_time(int argc, char **argv, qp_error *err) {
          CLI_TEXT, &o.peers, 0, 0, NULL},
         {"--threads", "T", "of everybody that uses several (default: all processors)", CLI_COUNT, &o.threads,
          1, 64, NULL},
+        {"--clock", "wall|processor",
+         "processor: of all threads, which other programs disturb less (default wall)", CLI_CHOICE, &clock, 0,
+         0, NULL},
         {"--device", "D", "host, P.D, or part of a name, as `quadplan devices` lists them", CLI_TEXT,
          &o.device, 0, 0, NULL},
         {"--memory", "MB", "of configurations that stay set up between rounds (default 4096)", CLI_COUNT,
@@ -105,6 +109,7 @@ static qp_status run_error_time(int argc, char **argv, qp_error *err) {
     if (status != QP_OK || arguments.help) return status;
     if (o.chart != NULL && !ends_in(o.chart, ".png") && !ends_in(o.chart, ".svg"))
         return qp_fail(err, QP_BAD_INPUT, "%s: a chart must be named .png or .svg", o.chart);
+    o.processor_time = clock == 1;
     status = check_outputs(&o, err);
     if (status != QP_OK) return status;
     et_run *run = qp_alloc(1, sizeof *run, true);

@@ -13,6 +13,7 @@ typedef struct et_options {
     uint64_t samples; /* a patch */
     uint64_t repeats, max_level, threads, seed;
     uint64_t memory_mb;    /* of configurations that are kept set up from round to round */
+    bool processor_time;   /* time frames by that of all threads, rather than by the wall clock */
     double setup_limit_ms; /* a peer's series ends with the level whose set-up exceeds it */
     const char *peers, *device, *json, *csv, *chart;
 } et_options;

@@ -66,13 +66,15 @@ static void print_variant(const et_configuration *c, char text[16]) {
 
 void et_print_table(const et_run *run, FILE *file) {
     fprintf(file,
-            "%s: %llu samples, %llu a patch; medians of %llu; %u threads; quadplan on %s\n"
+            "%s: %llu samples, %llu a patch; medians of %llu; %u threads, %s; quadplan on %s\n"
             "without: C crease nodes, T terminal nodes, E exact tail. * on the front; ! a peer that no "
             "configuration of\n"
             "quadplan is as fast and as near as; ratio: a peer's time over that of the fastest quadplan as "
             "near as it\n\n",
             run->mesh_name, (unsigned long long)run->count, (unsigned long long)run->options->samples,
-            (unsigned long long)run->options->repeats, run->task.threads, qp_device_name(run->device));
+            (unsigned long long)run->options->repeats, run->task.threads,
+            run->options->processor_time ? "processor time of all" : "wall clock",
+            qp_device_name(run->device));
     fprintf(file, "%-20s %5s %7s  %9s %7s  %9s %9s  %9s %9s  %9s %9s %8s\n", "", "level", "without",
             "ns/sample", "ratio", "pos. max", "pos. rms", "n. max", "n. rms", "set-up ms", "locate ms", "MB");
     for (size_t i = 0; i < run->n_configurations; ++i) {
@@ -163,6 +165,7 @@ void et_write_json(const et_run *run, FILE *file) {
     qp_json_integer(&json, "seed", run->options->seed);
     qp_json_integer(&json, "repeats", run->options->repeats);
     qp_json_integer(&json, "threads", run->task.threads);
+    qp_json_text(&json, "clock", run->options->processor_time ? "processor" : "wall");
     qp_json_text(&json, "device", qp_device_name(run->device));
     qp_json_integer(&json, "normals_undefined", run->normals_undefined);
     qp_json_integer(&json, "normals_parallel", run->normals_parallel);

@@ -3,6 +3,7 @@
 #define _GNU_SOURCE
 #include "host/base/measure.h"
 #include "host/cli/error_time.h"
+#include "host/frame/frame.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -25,6 +26,11 @@ static qp_status drop_from(et_run *run, const et_configuration *from, const char
         if (c->series == from->series && c->level >= from->level) c->dropped = true;
     }
     return et_skip_add(run, from->name, from->level, reason, err);
+}
+
+/* The clock that frames are timed by. */
+static double frame_clock(const et_run *run) {
+    return run->options->processor_time ? qp_processor_ms() : qp_now_ms();
 }
 
 static bool is_set_up(const et_configuration *c) {
@@ -57,13 +63,14 @@ static qp_status create_frame(et_run *run, et_configuration *c, qp_error *err) {
  * over is done anew each time, but is no part of a frame's time, as the peers' looking for their patches is not. */
 static qp_status quadplan_frame(et_run *run, et_configuration *c, qp_stream *stream, double *ms,
                                 double *locate_ms, qp_error *err) {
-    const double start = qp_now_ms();
+    const double start = frame_clock(run);
     qp_status status = qp_frame_update_positions(c->frame, err);
+    *ms = frame_clock(run) - start;
     const double updated = qp_now_ms();
     if (status == QP_OK)
         status = qp_frame_eval_points(c->frame, run->count, run->patch, run->uv, stream, err);
     if (status != QP_OK) return status;
-    *ms = updated - start + stream->frame_ms;
+    *ms += run->options->processor_time ? c->frame->processor_ms : stream->frame_ms;
     *locate_ms = qp_now_ms() - updated - stream->frame_ms;
     return QP_OK;
 }
@@ -160,9 +167,9 @@ static qp_status measure_peer(et_run *run, et_configuration *c, qp_error *err) {
         if (status == QP_OK) status = end_series(run, c, err);
     }
     if (status != QP_OK) return status;
-    const double start = qp_now_ms();
+    const double start = frame_clock(run);
     status = c->series->evaluate(c->peer, err);
-    c->frames[c->n_frames++] = qp_now_ms() - start;
+    c->frames[c->n_frames++] = frame_clock(run) - start;
     return status;
 }
 

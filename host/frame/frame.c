@@ -1,5 +1,6 @@
 /* One frame: hull, then domain, for every patch of a surface (sections 5 to 7 of the paper). */
 #include "host/frame/frame.h"
+#include "host/base/measure.h"
 #include "kernels/frame_layout.h"
 
 #include <math.h>
@@ -40,12 +41,16 @@ qp_status qp_frame_update_positions(qp_frame *frame, qp_error *err) {
     qp_status status = qp_frame_upload(frame, &frame->positions, local, reals * frame->real_size, "positions", err);
     free(local);
     if (has_tolerance(&frame->tessellation)) frame->tessellated = false;
+    free(frame->light);
+    frame->light = NULL;
     return status;
 }
 
 qp_status qp_frame_create(qp_device *device, const qp_surface *surface, const qp_frame_options *options,
                           qp_frame **frame, qp_error *err) {
     *frame = NULL;
+    if (options != NULL && !(options->tolerance >= 0 && options->tolerance <= DBL_MAX))
+        return qp_fail(err, QP_BAD_INPUT, "tolerance %g is not a number from 0 on", options->tolerance);
     qp_frame *f = qp_alloc(1, sizeof *f, true);
     if (f == NULL) return qp_fail_memory(err, sizeof *f, "a frame");
     f->device = device;
@@ -184,7 +189,7 @@ static qp_status evaluate(qp_frame *frame, qp_stream *stream, qp_error *err) {
                           .n_triangles = layout->n_triangles,
                           .triangles = layout->triangles,
                           .support_bytes = frame->peak_points * 4 * frame->real_size};
-    const double start = qp_now_ms();
+    const double start = qp_now_ms(), processor_start = qp_processor_ms();
     qp_status status = launch_batches(frame, &stream->hull_ms, &stream->domain_ms, err);
     /* Also after a failure: what was started writes its times into *stream. */
     qp_error finish_error;
@@ -209,6 +214,7 @@ static qp_status evaluate(qp_frame *frame, qp_stream *stream, qp_error *err) {
         stream->flags = (const uint8_t *)after;
     }
     stream->frame_ms = qp_now_ms() - start;
+    frame->processor_ms = qp_processor_ms() - processor_start;
     if (status == QP_OK && frame->options.want_hash)
         status = hash_stream(stream->vertices, (size_t)layout->n_samples * sample_bytes, &stream->hash, err);
     if (status != QP_OK) *stream = (qp_stream){0};
@@ -271,7 +277,7 @@ static qp_status set_up(qp_frame *frame, const qp_tessellation *tessellation, qp
         status = qp_layout_tessellate(frame->surface, &chosen, frame->share, frame->options.want_triangles,
                                       &frame->layout, err);
     free(edges);
-    if (status == QP_OK) status = qp_frame_deepen(frame, err);
+    if (status == QP_OK) status = qp_frame_deepen(frame, false, err);
     if (status == QP_OK) status = qp_frame_upload_layout(frame, err);
     if (status == QP_OK)
         frame->tessellated = true;
@@ -302,9 +308,14 @@ qp_status qp_frame_eval_points(qp_frame *frame, uint64_t count, const uint32_t *
     *stream = (qp_stream){0};
     qp_frame_drop_layout(frame);
     qp_status status = qp_layout_points(frame->surface, count, patch, uv, frame->share, &frame->layout, err);
-    if (status == QP_OK) status = qp_frame_deepen(frame, err);
+    if (status == QP_OK) status = qp_frame_deepen(frame, true, err);
     if (status == QP_OK) status = qp_frame_upload_layout(frame, err);
-    if (status == QP_OK) return evaluate(frame, stream, err);
+    if (status == QP_OK) {
+        status = evaluate(frame, stream, err);
+        if (status == QP_OK && frame->options.tolerance != 0 && !frame->options.no_exact_tail)
+            stream->bound = frame->light_bound;
+        return status;
+    }
     qp_frame_drop_layout(frame);
     return status;
 }

@@ -58,6 +58,8 @@ typedef struct qp_frame_batch {
 
 /* Steps of depth in which plans deeper than the surface's are made on demand (plans.c). */
 enum { QP_DEEP_STEPS = 4 };
+/* All steps: behind those, shallower ones, for points with a tolerance (light.c). */
+enum { QP_PLAN_STEPS = QP_DEEP_STEPS + 5, QP_LIGHT_NONE = 255 };
 
 struct qp_frame {
     qp_device *device;
@@ -69,10 +71,12 @@ struct qp_frame {
     uint32_t plan_flags; /* QP_PLAN_* */
     qp_buffer heads, trees, reals, rings, positions; /* of the surfaces */
     bool plans_uploaded;
-    qp_surface *deep[QP_DEEP_STEPS]; /* deeper plans, for the patches that ever needed them; NULL: none */
+    qp_surface *deep[QP_PLAN_STEPS]; /* deeper (and shallower) plans, for the patches that ever needed them; NULL: none */
     uint8_t *patch_step;             /* [n_patches] of the layout: 0 the surface's plans, s those of deep[s - 1]; NULL: all 0 */
-    uint32_t n_plans, first_plan[1 + QP_DEEP_STEPS]; /* on the device; those of each step */
-    uint64_t first_ring[1 + QP_DEEP_STEPS];
+    uint32_t n_plans, first_plan[1 + QP_PLAN_STEPS]; /* on the device; those of each step */
+    uint64_t first_ring[1 + QP_PLAN_STEPS];
+    uint8_t *light;     /* [n_patches] step within the tolerance of options, QP_LIGHT_NONE: none is; NULL: not yet chosen */
+    double light_bound; /* of their errors, of the diagonal */
     qp_buffer entries, grid_u, grid_v, support;      /* of the layout */
 
     qp_frame_layout layout;
@@ -85,6 +89,7 @@ struct qp_frame {
     size_t n_batches;
     qp_frame_batch *batches;
     uint64_t peak_points;
+    double processor_ms; /* of all threads, in what the last stream's frame_ms covers; for benchmarks */
 
     void *vertices; /* the stream's, page-aligned; grows only */
     size_t vertex_bytes;
@@ -105,9 +110,15 @@ typedef struct qp_frame_plan {
 } qp_frame_plan;
 qp_frame_plan qp_frame_plan_of(const qp_frame *frame, uint32_t patch);
 
-/* Chooses the plans for the layout's samples, makes deeper ones where they are needed, and uploads what is new. To be called for
+/* Chooses the plans for the layout's samples (of points: within the tolerance of the options, if any), makes deeper ones where they are needed, and uploads what is new. To be called for
  * every layout before qp_frame_upload_layout. */
-qp_status qp_frame_deepen(qp_frame *frame, qp_error *err);
+qp_status qp_frame_deepen(qp_frame *frame, bool points, qp_error *err);
+/* Level to which the plans of a step go, 1 .. QP_PLAN_STEPS. */
+uint32_t qp_step_level(uint8_t step);
+/* Makes frame->deep[step - 1] hold every patch whose patch_step is `step`; sets *changed when it did not before. */
+qp_status qp_frame_grow_step(qp_frame *frame, uint8_t step, bool *changed, qp_error *err);
+/* Chooses frame->light for the tolerance of the options, unless it is chosen. Uses patch_step. Errors: QP_SYSTEM for memory. */
+qp_status qp_frame_choose_light(qp_frame *frame, bool *changed, qp_error *err);
 void qp_frame_drop_deep(qp_frame *frame);
 /* Builds the kernels and uploads the plans of all surfaces. */
 qp_status qp_frame_upload_plans(qp_frame *frame, qp_error *err);

@@ -45,6 +45,9 @@ run "${small[@]}" --peers bfr,osd-cpu/gregory --json -
 value '{c["series"] for c in o["configurations"] if c["library"] != "quadplan"} ==
  {"bfr", "bfr-default", "bfr-double", "bfr-double-default", "osd-cpu/gregory"}'
 
+run "${small[@]}" --peers none --clock processor --json -
+value 'o["clock"] == "processor" and all(c["ns_per_sample"] > 0 for c in o["configurations"])'
+
 # A peer's series ends, and says so, where its set-up takes too long.
 run "${small[@]}" --peers bfr-double --setup-limit 0 --json -
 value 'any(s["series"] == "bfr-double" and s["from_level"] == 2 and "set-up" in s["reason"] for s in o["left_out"])'
