@@ -193,16 +193,16 @@ typedef struct qp_tessellation {
     const float *edge_factors;
     /* 0: none. Otherwise, where both are NULL, the least factors (whole numbers, one an edge) with which no point of a triangle is
      * farther than this, times the diagonal of the mesh's bounding box, from the limit surface at the same (u,v); .factor is then
-     * the largest one allowed, 0: 64. Chosen anew when it or the positions change, which takes about as long as making the plans. */
+     * the largest one allowed, 0: 64. Chosen anew when it or the positions change, which takes some 0.1 ms a patch. */
     double tolerance;
 } qp_tessellation;
 
 enum {
     QP_SAMPLE_PAST_DEPTH =
         1, /* (u,v) lies below the plan's last level: an approximation was returned (only with
-                                 no_exact_tail) */
+                                 no_exact_tail or within a frame's tolerance) */
     QP_SAMPLE_NO_NORMAL =
-        2, /* no tangent plane there: the normal is that of the patch's middle, or z where it has none. Where du
+        2, /* no tangent plane there: the normal is that of the patch's middle, or z where it has none (or the factor is 1). Where du
                                  and dv are parallel or vanish, the normal is the limit from within the patch, if there is one */
     QP_SAMPLE_LIMIT_FRAME =
         4 /* at an extraordinary or creased corner, where du and dv need not exist: they are tangents from
@@ -224,7 +224,8 @@ typedef struct qp_stream {
     double hull_ms, domain_ms, frame_ms; /* of this evaluation; frame_ms is the whole without set-up */
     uint64_t support_bytes;              /* control points held */
     uint64_t hash;                       /* of the bytes of vertices; 0 unless asked for */
-    double bound;            /* with a tolerance: proven bound of the error, of the diagonal, rounding included; 0 without one */
+    double bound;            /* with a tolerance: proven bound of the error of the triangles, or of points, of the diagonal, rounding
+                                included; 0 without one */
     uint64_t over_tolerance; /* patches whose bound is larger than the tolerance, as not even the largest factor is enough */
     float factor_min, factor_mean, factor_max; /* with a tolerance: of the edges */
 } qp_stream;
@@ -235,6 +236,9 @@ typedef struct qp_frame_options {
     int want_derivatives;
     int no_regular_pass; /* evaluate regular patches through the general kernels too (for comparison) */
     int no_sharing; /* every patch evaluates its own edges, which leaves cracks of an ulp or so (for comparison) */
+    /* 0: none. Otherwise qp_frame_eval_points takes, patch by patch, the shallowest plans whose positions are proven to err by no more
+     * than this times the diagonal; stream.bound is what they err by at most, rounding included. Normals have no bound. */
+    double tolerance;
     int no_exact_tail; /* samples below the depth of the surface's plans are approximated and flagged (for comparison) */
 } qp_frame_options;
 

@@ -14,6 +14,7 @@ qp_status cli_evaluation_open(const char *argument, const cli_evaluation_options
         .no_regular_pass = options->no_regular_pass,
         .no_sharing = options->no_sharing,
         .no_exact_tail = options->no_exact_tail,
+        .tolerance = options->tolerance,
     };
     qp_status status = cli_mesh_open(argument, &options->mesh, &evaluation->mesh, err);
     if (status == QP_OK)

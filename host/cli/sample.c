@@ -34,6 +34,7 @@ static void print_json(const char *name, const cli_evaluation *e, const cli_poin
     qp_json_text(&json, "mesh", name);
     qp_json_text(&json, "precision", s->precision == QP_DOUBLE ? "double" : "float");
     qp_json_text(&json, "device", qp_device_name(e->device));
+    if (s->bound > 0) qp_json_real(&json, "bound", s->bound);
     qp_json_open_array(&json, "samples");
     for (size_t i = 0; i < points->count; ++i) {
         double v[4][3];
@@ -66,6 +67,7 @@ static void print_row(const char *name, const double v[3], int digits) {
 }
 
 static void print_text(const cli_points *points, const qp_stream *s, const qp_reference_sample *exact) {
+    if (s->bound > 0) printf("no position is off by more than %.3g of the diagonal\n", s->bound);
     const int digits = s->precision == QP_DOUBLE ? 17 : 9;
     for (size_t i = 0; i < points->count; ++i) {
         double v[4][3];
@@ -135,6 +137,8 @@ static qp_status run(int argc, char **argv, qp_error *err) {
          NULL},
         {"--reference", NULL, "add the exact values, by refinement in extended precision", CLI_FLAG,
          &reference, 0, 0, NULL},
+        {"--tolerance", "T", "positions may be off by T times the bounding box's diagonal, for shallower plans",
+         CLI_REAL, &o.tolerance, 1e-300, 1e300, NULL},
         CLI_SAMPLING_OPTIONS(o),
         {"--json", NULL, "print one JSON object", CLI_FLAG, &json, 0, 0, NULL},
         {0},
@@ -156,7 +160,7 @@ static qp_status run(int argc, char **argv, qp_error *err) {
 const cli_command cli_sample = {
     "sample", "MESH", "Evaluates position, derivatives and normal at any points.",
     CLI_MESH_HELP
-    "\nFlags: 1 past the plans' depth (--no-exact-tail only), 2 no tangent plane there (the normal is the patch's middle's), 4 "
+    "\nFlags: 1 past the plans' depth (--no-exact-tail and --tolerance only), 2 no tangent plane there (the normal is the patch's middle's), 4 "
     "du and dv are a\n"
     "limit frame: tangents that span the tangent plane where derivatives need not exist. Any (u,v) is exact.",
     run};

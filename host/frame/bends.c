@@ -11,6 +11,10 @@
 #include <math.h>
 #include <string.h>
 
+static double larger(double a, double b) { /* fmax() is a call */
+    return a > b ? a : b;
+}
+
 /* One cubic's B-spline points to its Bezier points; `step` between points, in vectors. */
 static void bezier_row(double (*p)[3], int step) {
     for (int x = 0; x < 3; ++x) {
@@ -84,9 +88,9 @@ static qp_bend bezier_bend(double b[16][3], double width_u, double width_v, doub
     second_rows(b, 4, 1, 6 / (width_v * width_v), vv);
     mixed(b, 9 / (width_u * width_v), uv);
     for (int k = 0; k < 16; ++k) {
-        most_uu = fmax(most_uu, dot(uu[k], uu[k]));
-        most_uv = fmax(most_uv, dot(uv[k], uv[k]));
-        most_vv = fmax(most_vv, dot(vv[k], vv[k]));
+        most_uu = larger(most_uu, dot(uu[k], uu[k]));
+        most_uv = larger(most_uv, dot(uv[k], uv[k]));
+        most_vv = larger(most_vv, dot(vv[k], vv[k]));
     }
     most_uu = sqrt(most_uu);
     most_uv = sqrt(most_uv);
@@ -101,7 +105,7 @@ static qp_bend bezier_bend(double b[16][3], double width_u, double width_v, doub
         }
         const double pp = dot(p, p), qq = dot(uv[k], uv[k]), pq = dot(p, uv[k]);
         most =
-            fmax(most, sqrt(dot(m, m)) + sqrt(0.5 * (pp + qq + sqrt((pp - qq) * (pp - qq) + 4 * pq * pq))));
+            larger(most, sqrt(dot(m, m)) + sqrt(0.5 * (pp + qq + sqrt((pp - qq) * (pp - qq) + 4 * pq * pq))));
     }
     const qp_bend first = {most_uu + r * most_uv, most_vv + most_uv / r}, second = {most * s, most / s};
     return first.u / r + first.v * r < second.u / r + second.v * r ? first : second;

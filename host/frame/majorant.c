@@ -13,6 +13,7 @@
  * constant between the places 2^-k and 3/2 2^-k and their mirror images: leaves get small towards a patch's edges only. */
 #include "host/frame/majorant.h"
 #include "host/frame/bends.h"
+#include "host/frame/patch_points.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -37,11 +38,7 @@ typedef struct leaf {
 
 /* Scratch of one worker. */
 typedef struct work {
-    const qp_plan *plan;
-    double *points; /* 3 a point: relative to the first ring vertex, or to their origin (plan.h) */
-    size_t point_capacity;
-    double *ring;
-    size_t ring_capacity;
+    qp_patch_points at;
     leaf *leaves;
     size_t n_leaves, leaf_capacity;
     double mean_u, mean_v; /* sums over leaves, by area */
@@ -113,18 +110,14 @@ static void add_leaf(work *w, double p[16][3], node_place node, uint32_t rotatio
     }
 }
 
-static uint32_t point_at(const uint32_t *words, uint32_t slot) {
-    return words[slot / 2] >> (slot % 2 * 16) & 0xffffu;
-}
-
 static void read_points(const work *w, const uint32_t *words, double p[16][3]) {
-    for (uint32_t k = 0; k < 16; ++k) memcpy(p[k], w->points + 3 * (size_t)point_at(words, k), sizeof p[k]);
+    for (uint32_t k = 0; k < 16; ++k) memcpy(p[k], qp_patch_point(&w->at, words, k), sizeof p[k]);
 }
 
 /* Each zone of v is a spline of its own: the rows of points times the zone's matrix, over v times its scale. */
 static void add_crease(work *w, const uint32_t *node, node_place place) {
-    const qp_plan *plan = w->plan;
-    const double *c = plan->constants + (node[10] - (size_t)plan->point_count * plan->ring_size);
+    const qp_plan *plan = w->at.plan;
+    const double *c = plan->constants + (node[10] - qp_plan_first_constant(plan));
     const double ends[4] = {1, c[0], c[1], 0};
     double p[16][3], q[16][3];
     read_points(w, node + 2, p);
@@ -146,7 +139,7 @@ static void add_crease(work *w, const uint32_t *node, node_place place) {
 static void ring_points(const work *w, const uint32_t *ring, uint32_t cx, uint32_t cy, double p[16][3]) {
     for (uint32_t k = 0; k < 16; ++k) {
         const uint32_t slot = 5 * (cy + k / 4) + cx + k % 4 - 1;
-        memcpy(p[k], w->points + 3 * (size_t)point_at(ring, slot), sizeof p[k]);
+        memcpy(p[k], qp_patch_point(&w->at, ring, slot), sizeof p[k]);
     }
 }
 
@@ -171,14 +164,11 @@ static void add_rings(work *w, const uint32_t *node, node_place place) {
  * or less; in all `offset` twice. */
 static double corner_rest(const work *w, const uint32_t *node, const uint32_t *terminal) {
     const uint32_t rings = QP_NODE_RINGS(terminal[0]), first = rings > 3 ? rings - 3 : 0;
-    const double *limit = w->points + 3 * (size_t)node[1];
     double offset = 0;
     for (uint32_t r = first; r < rings; ++r) {
-        const bool absolute = r < QP_NODE_ABSOLUTE_RINGS(terminal[0]) || terminal[1] == QP_NO_POINT;
         for (uint32_t k = 0; k < 24; ++k) {
             double d[3];
-            memcpy(d, w->points + 3 * (size_t)point_at(terminal + 3 + 12 * r, k), sizeof d);
-            for (int x = 0; x < 3; ++x) d[x] -= absolute ? limit[x] : 0;
+            qp_patch_offset(&w->at, terminal, node, r, k, d);
             offset = fmax(offset, norm(d));
         }
     }
@@ -229,12 +219,12 @@ static void add_corner(work *w, const uint32_t *node, node_place place, const ui
  * stay. */
 static void add_unknown(work *w) {
     double most = 0;
-    for (uint32_t j = 0; j < w->plan->ring_size; ++j) most = fmax(most, norm(w->ring + 3 * (size_t)j));
+    for (uint32_t j = 0; j < w->at.plan->ring_size; ++j) most = fmax(most, norm(w->at.ring + 3 * (size_t)j));
     w->rest += 2 * most;
 }
 
 static void visit(work *w, uint32_t at, node_place place, const uint32_t *terminal) {
-    const uint32_t *node = w->plan->tree + at;
+    const uint32_t *node = w->at.plan->tree + at;
     double p[16][3];
     if (w->failed) return;
     switch (QP_NODE_KIND(node[0])) {
@@ -337,25 +327,7 @@ static bool make_functions(const work *w, const double *begins, uint32_t rotatio
 
 static bool make_one(work *w, const double *begins, const qp_surface *surface, uint32_t patch,
                      qp_patch_majorant *made) {
-    const qp_plan *plan = surface->plans[surface->patch_plan[patch]];
-    const uint32_t width = plan->ring_size, *vertices = surface->rings + surface->patch_ring[patch];
-    const double *positions = surface->mesh->positions, *origin = positions + 3 * (size_t)vertices[0];
-    if (!qp_grow((void **)&w->points, &w->point_capacity, 3 * (size_t)plan->point_count, sizeof *w->points) ||
-        !qp_grow((void **)&w->ring, &w->ring_capacity, 3 * (size_t)width, sizeof *w->ring))
-        return false;
-    for (size_t j = 0; j < width; ++j) {
-        for (size_t x = 0; x < 3; ++x)
-            w->ring[3 * j + x] = positions[3 * (size_t)vertices[j] + x] - origin[x];
-    }
-    for (size_t i = 0; i < plan->point_count; ++i) {
-        const double *row = plan->weights + i * width;
-        double sum[3] = {0};
-        for (size_t j = 0; j < width; ++j) {
-            for (size_t x = 0; x < 3; ++x) sum[x] += row[j] * w->ring[3 * j + x];
-        }
-        memcpy(w->points + 3 * i, sum, sizeof sum);
-    }
-    w->plan = plan;
+    if (!qp_patch_points_make(surface, patch, &w->at)) return false;
     w->n_leaves = 0;
     w->rest = w->ratio = w->mean_u = w->mean_v = 0;
     visit(w, 0, (node_place){0, 0, 1}, NULL);
@@ -397,7 +369,8 @@ static qp_status deepen(const qp_surface *surface, qp_surface **deep, qp_error *
         if (surface->patch_plan[p] == QP_NONE) continue;
         const qp_plan *plan = surface->plans[surface->patch_plan[p]];
         mask[p] = (plan->flags & QP_PLAN_IRREGULAR) != 0 ||
-                  ((plan->flags & QP_PLAN_CORNERS) != 0 && plan->depth < RINGS);
+                  ((plan->flags & QP_PLAN_CORNERS) != 0 &&
+                   (plan->depth < RINGS || !qp_patch_settles(surface->mesh, p, plan->depth)));
         any = any || mask[p];
     }
     qp_status status = any ? qp_surface_create_for(surface->mesh, &options, mask, deep, err) : QP_OK;
@@ -422,8 +395,7 @@ qp_status qp_majorants_make(const qp_surface *surface, qp_patch_majorant **major
         qp_parallel(n, 16, make_some, job);
         for (unsigned i = 0; i < MOST_WORKERS; ++i) {
             ok = ok && !job->workers[i].failed;
-            free(job->workers[i].points);
-            free(job->workers[i].ring);
+            qp_patch_points_free(&job->workers[i].at);
             free(job->workers[i].leaves);
         }
     }

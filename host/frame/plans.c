@@ -11,12 +11,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Below all semi-sharp creases at the least, so that deep plans end in extraordinary corners only. */
-static const uint32_t deep_levels[QP_DEEP_STEPS] = {16, 24, 40, QP_DEPTH_LIMIT};
+/* Deeper: below all semi-sharp creases at the least, so that they end in extraordinary corners only. Then shallower ones. */
+static const uint32_t step_levels[QP_PLAN_STEPS] = {16, 24, 40, QP_DEPTH_LIMIT, 2, 3, 4, 6, 8};
+
+uint32_t qp_step_level(uint8_t step) {
+    return step_levels[step - 1];
+}
 
 static uint8_t step_for(int level) {
     uint8_t step = 0;
-    while (step + 1 < QP_DEEP_STEPS && (int)deep_levels[step] < level) ++step;
+    while (step + 1 < QP_DEEP_STEPS && (int)step_levels[step] < level) ++step;
     return step + 1;
 }
 
@@ -38,7 +42,8 @@ qp_frame_plan qp_frame_plan_of(const qp_frame *frame, uint32_t patch) {
 
 typedef struct depth_job {
     const qp_frame *frame;
-    uint8_t *steps; /* [n_items] */
+    const uint8_t *light; /* NULL: without a tolerance */
+    uint8_t *steps;       /* [n_items] */
 } depth_job;
 
 /* The deepest level at which a sample of the item lies, of those that its plan does not evaluate exactly; 0: none. */
@@ -72,6 +77,10 @@ static void find_steps(void *context, size_t begin, size_t end, unsigned worker)
     const depth_job *job = context;
     (void)worker;
     for (size_t i = begin; i < end; ++i) {
+        if (job->light != NULL && job->light[job->frame->layout.items[i].patch] != QP_LIGHT_NONE) {
+            job->steps[i] = job->light[job->frame->layout.items[i].patch];
+            continue;
+        }
         const int level = missing_level(job->frame, &job->frame->layout.items[i]);
         job->steps[i] = level == 0 ? 0 : step_for(level);
     }
@@ -79,8 +88,7 @@ static void find_steps(void *context, size_t begin, size_t end, unsigned worker)
 
 /* ---- deeper plans ---- */
 
-/* Makes frame->deep[step - 1] hold every patch that needs it. */
-static qp_status grow_step(qp_frame *frame, uint8_t step, bool *changed, qp_error *err) {
+qp_status qp_frame_grow_step(qp_frame *frame, uint8_t step, bool *changed, qp_error *err) {
     const uint32_t n_patches = frame->surface->mesh->n_patches;
     qp_surface **deep = &frame->deep[step - 1];
     uint8_t *mask = qp_alloc(n_patches, 1, true);
@@ -93,7 +101,7 @@ static qp_status grow_step(qp_frame *frame, uint8_t step, bool *changed, qp_erro
     }
     qp_status status = QP_OK;
     if (missing) {
-        const qp_surface_options options = {.depth = deep_levels[step - 1]};
+        const qp_surface_options options = {.depth = step_levels[step - 1]};
         qp_surface *grown;
         status = qp_surface_create_for(frame->surface->mesh, &options, mask, &grown, err);
         if (status == QP_OK) {
@@ -106,14 +114,21 @@ static qp_status grow_step(qp_frame *frame, uint8_t step, bool *changed, qp_erro
     return status;
 }
 
-qp_status qp_frame_deepen(qp_frame *frame, qp_error *err) {
+qp_status qp_frame_deepen(qp_frame *frame, bool points, qp_error *err) {
     const qp_frame_layout *layout = &frame->layout;
     const uint32_t n_patches = frame->surface->mesh->n_patches;
     if (frame->options.no_exact_tail) return QP_OK;
     if (frame->patch_step == NULL && (frame->patch_step = qp_alloc(n_patches, 1, false)) == NULL)
         return qp_fail_memory(err, n_patches, "deeper plans");
+    bool changed = false;
+    const bool light = points && frame->options.tolerance != 0;
+    qp_status status = light ? qp_frame_choose_light(frame, &changed, err) : QP_OK;
+    if (status != QP_OK) {
+        qp_frame_drop_deep(frame);
+        return status;
+    }
     memset(frame->patch_step, 0, n_patches);
-    depth_job job = {frame, qp_alloc(layout->n_items, 1, false)};
+    depth_job job = {frame, light ? frame->light : NULL, qp_alloc(layout->n_items, 1, false)};
     if (job.steps == NULL) return qp_fail_memory(err, layout->n_items, "deeper plans");
     qp_parallel(layout->n_items, 16, find_steps, &job);
     for (size_t i = 0; i < layout->n_items; ++i) {
@@ -121,22 +136,21 @@ qp_status qp_frame_deepen(qp_frame *frame, qp_error *err) {
         if (job.steps[i] > *step) *step = job.steps[i];
     }
     free(job.steps);
-    bool changed = false;
-    qp_status status = QP_OK;
     for (uint8_t step = 1; step <= QP_DEEP_STEPS && status == QP_OK; ++step)
-        status = grow_step(frame, step, &changed, err);
+        status = qp_frame_grow_step(frame, step, &changed, err);
     if (status == QP_OK && (changed || !frame->plans_uploaded)) status = qp_frame_upload_plans(frame, err);
     if (status != QP_OK) qp_frame_drop_deep(frame);
     return status;
 }
 
 void qp_frame_drop_deep(qp_frame *frame) {
-    for (uint32_t d = 0; d < QP_DEEP_STEPS; ++d) {
+    for (uint32_t d = 0; d < QP_PLAN_STEPS; ++d) {
         qp_surface_free(frame->deep[d]);
         frame->deep[d] = NULL;
     }
     free(frame->patch_step);
-    frame->patch_step = NULL;
+    free(frame->light);
+    frame->patch_step = frame->light = NULL;
 }
 
 /* ---- on the device ---- */
@@ -151,7 +165,7 @@ qp_status qp_frame_upload(qp_frame *frame, qp_buffer *buffer, const void *from, 
 static qp_status build_kernels(qp_frame *frame, qp_error *err) {
     unsigned kernels = 0;
     uint32_t flags = 0;
-    for (uint8_t step = 0; step <= QP_DEEP_STEPS; ++step) {
+    for (uint8_t step = 0; step <= QP_PLAN_STEPS; ++step) {
         const qp_surface *surface = surface_at(frame, step);
         for (uint32_t p = 0; surface != NULL && p < surface->mesh->n_patches; ++p) {
             if (surface->patch_plan[p] == QP_NONE) continue;
@@ -192,10 +206,10 @@ static qp_status upload_rings(qp_frame *frame, const qp_surface *const *surfaces
 }
 
 qp_status qp_frame_upload_plans(qp_frame *frame, qp_error *err) {
-    const qp_surface *surfaces[1 + QP_DEEP_STEPS];
+    const qp_surface *surfaces[1 + QP_PLAN_STEPS];
     uint32_t n_surfaces = 0, n_plans = 0;
     uint64_t entries = 0;
-    for (uint8_t step = 0; step <= QP_DEEP_STEPS; ++step) {
+    for (uint8_t step = 0; step <= QP_PLAN_STEPS; ++step) {
         const qp_surface *surface = surface_at(frame, step);
         if (surface == NULL) continue;
         surfaces[n_surfaces++] = surface;

@@ -12,7 +12,7 @@
 
 enum { FACTORS = 6, ROUNDS = 8, UNITS = 1 << 16, MOST_WORKERS = 65 };
 
-/* Of the diagonal: what evaluation may be off by (docs/accuracy of the stream), without what large coordinates lose. */
+/* Of the diagonal: what evaluation may be off by, large coordinates apart. */
 static const double rounding[2] = {3e-7, 1e-13};
 
 typedef struct wish {
@@ -312,8 +312,7 @@ static void summarise(const tolerance_work *w, double lost, qp_tolerance_report 
     report->factor_mean = count != 0 ? (float)(sum / (double)count) : 0;
 }
 
-/* What rounding may move a sample by: relative to the diagonal, and half a unit of the last place of its coordinates. */
-static double rounding_of(const qp_mesh *mesh, qp_precision precision) {
+double qp_tolerance_rounding(const qp_mesh *mesh, qp_precision precision) {
     double farthest = 0;
     for (int x = 0; x < 3; ++x)
         farthest = fmax(farthest, fmax(fabs(mesh->box_min[x]), fabs(mesh->box_max[x])));
@@ -330,7 +329,7 @@ qp_status qp_tolerance_factors(const qp_surface *surface, const qp_tessellation 
     if (tess->factor != 0 && !(tess->factor >= 1 && tess->factor <= 64))
         return qp_fail(err, QP_BAD_INPUT, "tessellation factor %g is not between 1 and 64",
                        (double)tess->factor);
-    const double lost = rounding_of(mesh, precision);
+    const double lost = qp_tolerance_rounding(mesh, precision);
     tolerance_work w = {.surface = surface,
                         .tess = *tess,
                         .edge_factors = edge_factors,

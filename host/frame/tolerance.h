@@ -20,4 +20,7 @@ qp_status qp_tolerance_factors(const qp_surface *surface, const qp_tessellation 
                                qp_precision precision, float *edge_factors, qp_tolerance_report *report,
                                qp_error *err);
 
+/* What rounding moves a sample by at most: a part of the diagonal, and a unit of the last place of the largest coordinate. */
+double qp_tolerance_rounding(const qp_mesh *mesh, qp_precision precision);
+
 #endif

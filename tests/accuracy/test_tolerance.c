@@ -175,6 +175,45 @@ static void one(const char *name, qp_frame *frame, qp_frame *exact, const qp_sur
     printf("\n");
 }
 
+static double light_least = 1, light_most, light_bytes;
+static unsigned lights;
+
+/* Points within a tolerance: samples all over, and close to corners. */
+static void points_within(const qp_surface *surface, qp_frame *exact, double tolerance,
+                          qp_precision precision, uint64_t samples) {
+    const qp_mesh *mesh = surface->mesh;
+    qp_error err = {0};
+    qp_frame *frame = NULL;
+    const qp_frame_options options = {.precision = precision, .tolerance = tolerance};
+    if (!CHECK_OK(qp_frame_create(device, surface, &options, &frame, &err), err)) return;
+    for (int corner = 0; corner < 2; ++corner) {
+        qp_sample_set set = {0};
+        qp_stream s, e;
+        if (!CHECK_OK(qp_sample_set_make(mesh, corner ? "corner" : "random", samples, 5, &set, &err), err))
+            break;
+        if (CHECK_OK(qp_frame_eval_points(frame, set.count, set.patch, set.uv, &s, &err), err) &&
+            CHECK_OK(qp_frame_eval_points(exact, set.count, set.patch, set.uv, &e, &err), err)) {
+            double most = 0;
+            for (uint64_t i = 0; i < set.count; ++i) {
+                double p[3];
+                for (size_t x = 0; x < 3; ++x) p[x] = coordinate(&s, 6 * i + x);
+                most = fmax(most, distance(p, (const double *)e.vertices + 6 * i));
+            }
+            most /= mesh->diagonal;
+            CHECK(most <= s.bound);
+            CHECK(s.bound <= tolerance || tolerance < 1e-6);
+            if (tolerance >= 1e-4 && corner) {
+                light_least = fmin(light_least, most / s.bound);
+                light_most = fmax(light_most, most / s.bound);
+                light_bytes += (double)s.support_bytes / (double)(e.support_bytes / 2);
+                ++lights;
+            }
+        }
+        qp_sample_set_free(&set);
+    }
+    qp_frame_free(frame);
+}
+
 /* Each tolerance under another spacing, or all under equal spacing and compared with uniform factors. */
 static void every_tolerance(const char *name, qp_mesh *mesh, const double *tolerances, unsigned n,
                             uint64_t most, int compare) {
@@ -189,6 +228,9 @@ static void every_tolerance(const char *name, qp_mesh *mesh, const double *toler
         for (unsigned i = 0; i < n; ++i)
             one(name, frame, exact, surface, (qp_spacing)(compare ? QP_EQUAL : (int)(i % 3)), tolerances[i],
                 most, compare);
+        points_within(surface, exact, 1e-3, QP_FLOAT, most / 10);
+        points_within(surface, exact, 1e-4, QP_FLOAT, most / 10);
+        points_within(surface, exact, 1e-9, QP_DOUBLE, most / 10);
     }
     qp_frame_free(frame);
     qp_frame_free(exact);
@@ -282,6 +324,9 @@ int main(void) {
     printf("measured over bound: %.3g to %.3g, geometric mean %.3g; uniform factors take %.2f times the "
            "samples\n",
            least_ratio, most_ratio, mean, saved);
+    printf("points: measured over bound %.3g to %.3g, control points %.2f of those of exact frames\n",
+           light_least, light_most, light_bytes / lights);
+    CHECK(light_most > 0.3 && light_bytes / lights < 0.7);
     CHECK(mean > 0.2);
     if (comparisons != 0) CHECK(saved > 1.2);
     qp_device_free(device);
