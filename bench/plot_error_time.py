@@ -85,8 +85,11 @@ def draw_panel(axes, result, key, label):
     axes.fill_between([1e-3, xs[0]], top, FLOOR * 1e-3, color="#f3ece0", zorder=0)
     axes.plot([xs[0]] + xs + [right], [top] + ys + [ys[-1]], color="#7a4b00", linewidth=1.6, zorder=4)
     for precision, colour in (("float", FLOAT), ("double", DOUBLE)):
+        some = [c for c in ours if c["precision"] == precision and "tolerance" in c]
+        axes.scatter([c["ns_per_sample"] for c in some], [value(c, key) for c in some], s=34, marker="D",
+                     facecolor="#F0E442", edgecolor=colour, linewidth=0.9, zorder=5.5)
         for exact, face in ((True, colour), (False, "white")):
-            some = [c for c in ours if c["precision"] == precision and c["exact_tail"] == exact]
+            some = [c for c in ours if c["precision"] == precision and c["exact_tail"] == exact and "tolerance" not in c]
             axes.scatter([c["ns_per_sample"] for c in some], [value(c, key) for c in some], s=20, facecolor=face,
                          edgecolor=colour, linewidth=0.8, zorder=5 if exact else 4.5)
     axes.set_xscale("log")
@@ -109,14 +112,17 @@ def draw_panel(axes, result, key, label):
     return used
 
 
-def legend_handles(used):
-    def dot(face, edge):
-        return Line2D([], [], linestyle="", marker="o", markersize=5, markerfacecolor=face, markeredgecolor=edge)
+def legend_handles(used, tolerances):
+    def dot(face, edge, marker="o"):
+        return Line2D([], [], linestyle="", marker=marker, markersize=5, markerfacecolor=face, markeredgecolor=edge)
 
     handles = [dot(FLOAT, FLOAT), dot("white", FLOAT), dot(DOUBLE, DOUBLE), dot("white", DOUBLE),
                Line2D([], [], color="#7a4b00", linewidth=1.6)]
     labels = ["quadplan, float", "quadplan, float, no exact tail", "quadplan, double",
               "quadplan, double, no exact tail", "quadplan's Pareto front"]
+    if tolerances:
+        handles[4:4] = [dot("#F0E442", FLOAT, "D"), dot("#F0E442", DOUBLE, "D")]
+        labels[4:4] = ["quadplan, float, tolerances", "quadplan, double, tolerances"]
     for prefix, (colour, name) in PEERS.items():
         if any(p == prefix for p, _ in used):
             handles.append(Line2D([], [], color=colour, linewidth=3))
@@ -139,7 +145,7 @@ def main(source, target):
     threads = "1 thread" if result["threads"] == 1 else "%d threads" % result["threads"]
     figure.suptitle("%s: %s samples off the grid, %s, medians of %d rounds; position and tangents or normal"
                     % (name, format(result["samples"], ","), threads, result["repeats"]), y=0.975, fontsize=12)
-    handles, labels = legend_handles(used)
+    handles, labels = legend_handles(used, any("tolerance" in c for c in result["configurations"]))
     figure.legend(handles, labels, loc="lower center", ncol=4, frameon=False, fontsize=9, handletextpad=0.5,
                   columnspacing=1.6)
     rows = (len(labels) + 3) // 4

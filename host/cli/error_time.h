@@ -25,6 +25,7 @@ typedef struct et_configuration {
     unsigned level;               /* depth of plans; 0 where a peer's series has no levels */
     qp_precision precision;
     bool crease_nodes, terminal_nodes, exact_tail; /* quadplan's */
+    double tolerance, bound; /* quadplan's; 0: none. Bound of the error that it promises */
 
     /* While it is set up. */
     qp_peer *peer;

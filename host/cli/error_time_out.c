@@ -61,13 +61,15 @@ static void print_variant(const et_configuration *c, char text[16]) {
     /* Capital letters for what was left out. */
     snprintf(text, 16, "%s%s%s", c->crease_nodes ? "" : "C", c->terminal_nodes ? "" : "T",
              c->exact_tail ? "" : "E");
+    if (c->tolerance > 0) snprintf(text, 16, "t %.0e", c->tolerance);
     if (c->series != NULL) text[0] = '\0';
 }
 
 void et_print_table(const et_run *run, FILE *file) {
     fprintf(file,
             "%s: %llu samples, %llu a patch; medians of %llu; %u threads, %s; quadplan on %s\n"
-            "without: C crease nodes, T terminal nodes, E exact tail. * on the front; ! a peer that no "
+            "without: C crease nodes, T terminal nodes, E exact tail; t: tolerance. * on the front; ! a peer "
+            "that no "
             "configuration of\n"
             "quadplan is as fast and as near as; ratio: a peer's time over that of the fastest quadplan as "
             "near as it\n\n",
@@ -126,6 +128,10 @@ static void write_configuration(const et_run *run, const et_configuration *c, qp
         qp_json_bool(json, "crease_nodes", c->crease_nodes);
         qp_json_bool(json, "terminal_nodes", c->terminal_nodes);
         qp_json_bool(json, "exact_tail", c->exact_tail);
+        if (c->tolerance > 0) {
+            write_real(json, "tolerance", c->tolerance);
+            write_real(json, "bound", c->bound);
+        }
         write_real(json, "plans_ms",
                    c->surface_ms); /* of setup_ms; the rest is mostly the runtime's, for kernels */
     }
@@ -188,19 +194,20 @@ void et_write_json(const et_run *run, FILE *file) {
 }
 
 void et_write_csv(const et_run *run, FILE *file) {
-    fputs("series,library,precision,level,crease_nodes,terminal_nodes,exact_tail,threads,ns_per_sample,setup_"
+    fputs("series,library,precision,level,crease_nodes,terminal_nodes,exact_tail,tolerance,threads,ns_per_"
+          "sample,setup_"
           "ms,locate_ms,"
           "bytes,position_max,position_rms,normal_max_deg,normal_rms_deg,nonfinite,apart,front,ratio\n",
           file);
     for (size_t i = 0; i < run->n_configurations; ++i) {
         const et_configuration *c = &run->configurations[i];
         const bool ours = c->series == NULL;
-        fprintf(file, "%s,%s,%s,%u,%s,%s,%s,%u,%.6g,%.6g,%.6g,%llu,%.6g,%.6g,%.6g,%.6g,%llu,%llu,%d,",
+        fprintf(file, "%s,%s,%s,%u,%s,%s,%s,%g,%u,%.6g,%.6g,%.6g,%llu,%.6g,%.6g,%.6g,%.6g,%llu,%llu,%d,",
                 c->name, library_name(c), precision_name(c), c->level,
                 ours ? (c->crease_nodes ? "1" : "0") : "", ours ? (c->terminal_nodes ? "1" : "0") : "",
-                ours ? (c->exact_tail ? "1" : "0") : "", threads_of(run, c), c->ns, c->setup_ms, c->locate_ms,
-                (unsigned long long)c->bytes, c->position_max, c->position_rms, c->normal_max, c->normal_rms,
-                (unsigned long long)c->nonfinite, (unsigned long long)c->apart, c->front);
+                ours ? (c->exact_tail ? "1" : "0") : "", c->tolerance, threads_of(run, c), c->ns, c->setup_ms,
+                c->locate_ms, (unsigned long long)c->bytes, c->position_max, c->position_rms, c->normal_max,
+                c->normal_rms, (unsigned long long)c->nonfinite, (unsigned long long)c->apart, c->front);
         if (c->ratio > 0) fprintf(file, "%.6g", c->ratio);
         fputc('\n', file);
     }

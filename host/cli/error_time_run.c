@@ -55,16 +55,18 @@ static void add_setup(et_configuration *c, double setup_ms, double locate_ms) {
 /* ---- quadplan ---- */
 
 static qp_status create_frame(et_run *run, et_configuration *c, qp_error *err) {
-    const qp_frame_options options = {.precision = c->precision, .no_exact_tail = !c->exact_tail};
+    const qp_frame_options options = {
+        .precision = c->precision, .no_exact_tail = !c->exact_tail, .tolerance = c->tolerance};
     return qp_frame_create(run->device, c->surface, &options, &c->frame, err);
 }
 
-/* A frame as a program runs it: positions that moved, then all samples. Putting the samples in order and handing them
+/* A frame as a program runs it: positions that moved, then all samples. With a tolerance the plans are chosen by the
+ * positions, which takes much longer than a frame: it is for positions that stay, and the choice is part of set-up. Putting the samples in order and handing them
  * over is done anew each time, but is no part of a frame's time, as the peers' looking for their patches is not. */
 static qp_status quadplan_frame(et_run *run, et_configuration *c, qp_stream *stream, double *ms,
                                 double *locate_ms, qp_error *err) {
     const double start = frame_clock(run);
-    qp_status status = qp_frame_update_positions(c->frame, err);
+    qp_status status = c->tolerance > 0 ? QP_OK : qp_frame_update_positions(c->frame, err);
     *ms = frame_clock(run) - start;
     const double updated = qp_now_ms();
     if (status == QP_OK)
@@ -115,6 +117,7 @@ static qp_status measure_quadplan(et_run *run, et_configuration *c, qp_error *er
     }
     if (!c->measured) {
         status = et_quadplan_errors(run, c, &stream, err);
+        c->bound = stream.bound;
         c->bytes = (c->precision == QP_DOUBLE ? 2 : 1) * c->plan_bytes + stream.support_bytes;
     }
     if (status == QP_OK) status = quadplan_frame(run, c, &stream, &ms, &locate_ms, err);

@@ -118,6 +118,25 @@ static qp_status add_quadplan(et_run *run, unsigned depth, bool crease_nodes, bo
     return QP_OK;
 }
 
+/* The deepest plans, with the tolerance that takes the shallowest ones of them that will do. */
+static qp_status add_tolerances(et_run *run, qp_error *err) {
+    static const double tolerances[] = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7};
+    const et_surface *from = run->surfaces + run->options->max_level * VARIANTS;
+    for (size_t i = 0; i < sizeof tolerances / sizeof *tolerances; ++i) {
+        const size_t first = run->n_configurations;
+        qp_status status = add_quadplan(run, (unsigned)run->options->max_level, true, true, from, err);
+        if (status != QP_OK) return status;
+        size_t kept = first;
+        for (size_t k = first; k < run->n_configurations; ++k) {
+            et_configuration *c = &run->configurations[k];
+            c->tolerance = tolerances[i];
+            if (c->exact_tail) run->configurations[kept++] = *c;
+        }
+        run->n_configurations = kept;
+    }
+    return QP_OK;
+}
+
 qp_status et_list_quadplan(et_run *run, qp_error *err) {
     run->surfaces = qp_alloc((ET_MOST_LEVEL + 1) * VARIANTS, sizeof *run->surfaces, true);
     if (run->surfaces == NULL) return qp_fail_memory(err, sizeof *run->surfaces, "surfaces");
@@ -135,6 +154,7 @@ qp_status et_list_quadplan(et_run *run, qp_error *err) {
                 status = add_quadplan(run, depth, crease_nodes, terminal_nodes, first + v, err);
         }
     }
+    if (status == QP_OK) status = add_tolerances(run, err);
     if (status == QP_OK && !qp_device_has_double(run->device))
         status = et_skip_add(run, "quadplan-double", 0, "the device has no double precision", err);
     return status;
