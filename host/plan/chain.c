@@ -278,7 +278,7 @@ void qp_plan_put_tail(qp_builder *b, uint32_t level, qp_item *item) {
     if (b->failed || b->too_large) return;
     item->parent_word = put_terminal(b, chain, out[0]);
     if (b->failed) return;
-    const uint32_t mode = qp_plan_split_mode(b, chain, level);
+    const uint32_t mode = qp_plan_split_mode(b, chain, item->cell->corner[corner].fan, level);
     if (b->failed || b->too_large) return;
     if (mode != QP_NO_POINT) {
         b->flags |= QP_PLAN_MODES;

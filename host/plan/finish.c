@@ -4,10 +4,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-static int compare_points(const void *a, const void *b) {
-    const qp_final_point *p = a, *q = b;
-    if (p->need != q->need) return p->need < q->need ? -1 : 1;
-    return p->order < q->order ? -1 : p->order > q->order;
+/* Where each point goes: in order of the level that needs it, and made, within a level. */
+static void sort_points(const qp_final_point *points, uint32_t count, uint32_t *index) {
+    uint32_t next[QP_LEVELS + 1] = {0};
+    for (uint32_t i = 0; i < count; ++i) ++next[points[i].need + 1];
+    for (uint32_t n = 1; n <= QP_LEVELS; ++n) next[n] += next[n - 1];
+    for (uint32_t i = 0; i < count; ++i) index[i] = next[points[i].need]++;
 }
 
 static void renumber(uint32_t *words, uint32_t count, const uint32_t *index) {
@@ -87,21 +89,17 @@ qp_plan *qp_plan_finish(qp_builder *b) {
     if (b->constant_count > 0) {
         memcpy(plan->constants, b->constants, b->constant_count * sizeof *plan->constants);
     }
-    qsort(b->points, count, sizeof *b->points, compare_points);
+    sort_points(b->points, count, index);
     for (uint32_t i = 0; i < count; ++i) {
         const qp_final_point *p = &b->points[i];
-        index[p->order] = i;
-        plan->point_kinds[i] = p->kind;
-        plan->point_scales[i] = p->scale;
-        plan->point_shares[i] = p->share;
-        memcpy(plan->weights + (size_t)i * width, qp_plan_final_row(b, p->order), width * sizeof(double));
+        const uint32_t at = index[i];
+        plan->point_kinds[at] = p->kind;
+        plan->point_scales[at] = p->scale;
+        plan->point_shares[at] = p->share;
+        plan->point_origins[at] = p->origin == QP_NO_POINT ? p->origin : (uint16_t)index[p->origin];
+        plan->point_modes[at] = p->mode == QP_NO_POINT ? p->mode : (uint16_t)index[p->mode];
+        memcpy(plan->weights + (size_t)at * width, qp_plan_final_row(b, i), width * sizeof(double));
         for (uint32_t n = p->need; n < QP_LEVELS; ++n) ++plan->rows[n];
-    }
-    for (uint32_t i = 0; i < count; ++i) {
-        uint16_t origin = b->points[i].origin;
-        uint16_t mode = b->points[i].mode;
-        plan->point_origins[i] = origin == QP_NO_POINT ? origin : (uint16_t)index[origin];
-        plan->point_modes[i] = mode == QP_NO_POINT ? mode : (uint16_t)index[mode];
     }
     plan->rows[QP_LEVELS - 1] = count;
     renumber_tree(plan, index);

@@ -73,9 +73,16 @@ static void split_ring(qp_builder *b, const uint32_t *points, uint32_t mode) {
     }
 }
 
-uint32_t qp_plan_split_mode(qp_builder *b, const qp_chain *chain, uint32_t level) {
+/* Smooth vertices have two modes alike. */
+static bool is_smooth(const qp_fan *fan) {
+    bool sharp = !fan->closed || fan->sharpness > 0.0f || fan->through;
+    for (uint32_t j = 0; j < qp_fan_spokes(fan) && !sharp; ++j) sharp = fan->sharp[j] > 0.0f;
+    return !sharp;
+}
+
+uint32_t qp_plan_split_mode(qp_builder *b, const qp_chain *chain, const qp_fan *fan, uint32_t level) {
     const uint32_t width = b->local.width;
-    if (chain->rings <= chain->absolute_rings) return QP_NO_POINT;
+    if (chain->rings <= chain->absolute_rings || is_smooth(fan)) return QP_NO_POINT;
     double *mode = qp_alloc(2 * (size_t)width, sizeof *mode, false);
     if (mode == NULL) {
         b->failed = true;

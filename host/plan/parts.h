@@ -16,7 +16,6 @@ typedef struct qp_final_point {
     uint8_t scale;   /* a device gets 2^scale times the row */
     uint16_t mode;   /* point of which the row holds `share` (mode.c), or QP_NO_POINT */
     double share;
-    uint32_t order; /* becomes its index once sorted */
 } qp_final_point;
 
 /* One dimension of a cell: [lo, hi], and whether a sample at either end comes here or goes on. */
@@ -90,7 +89,7 @@ bool qp_plan_is_permanent(const qp_builder *b, uint32_t level, const qp_item *it
 void qp_plan_put_tail(qp_builder *b, uint32_t level, qp_item *item);
 
 /* mode.c: splits the rings of a chain that has an origin, where they tend to one vector. The point of that vector, or QP_NO_POINT. */
-uint32_t qp_plan_split_mode(qp_builder *b, const qp_chain *chain, uint32_t level);
+uint32_t qp_plan_split_mode(qp_builder *b, const qp_chain *chain, const qp_fan *fan, uint32_t level);
 
 /* finish.c */
 qp_plan *qp_plan_finish(qp_builder *b);

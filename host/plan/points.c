@@ -60,11 +60,8 @@ uint32_t qp_plan_new_final(qp_builder *b, uint8_t need, uint32_t kind) {
         b->too_large = true;
         return 0;
     }
-    b->points[b->point_count] = (qp_final_point){.need = need,
-                                                 .kind = (uint8_t)kind,
-                                                 .origin = QP_NO_POINT,
-                                                 .mode = QP_NO_POINT,
-                                                 .order = b->point_count};
+    b->points[b->point_count] =
+        (qp_final_point){.need = need, .kind = (uint8_t)kind, .origin = QP_NO_POINT, .mode = QP_NO_POINT};
     return b->point_count++;
 }
 
