@@ -4,11 +4,12 @@
 
 enum { MAX_ARGS = 16 };
 
-/* Work-items a group. A device whose items have vector registers to themselves needs no more than the hull
- * stage's 32, as the paper has it; for the sample loops one item is enough there. No number changes a bit of the stream. */
+/* Work-items a group. A processor needs no more than the hull stage's 32, as the paper has it; for the sample loops one item is
+ * enough there, whose lanes are in the kernels (and in Mesa 22.3 items of one group that walk a tree by different ways disturb each
+ * other, see docs/same-bits.md). No number changes a bit of the stream. */
 static size_t group_items(const qp_device *device, qp_kernel_id kernel) {
     if (device->items != 0) return device->items;
-    return kernel == QP_KERNEL_HULL || device->lanes_float == 1 ? 32 : 1;
+    return kernel == QP_KERNEL_HULL || !device->info.is_cpu ? 32 : 1;
 }
 
 typedef struct host_launch {
