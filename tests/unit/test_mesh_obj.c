@@ -165,7 +165,7 @@ static void check_refusals(void) {
         {"v 0 1,5 0\n", "text:1: coordinate \"1,5\" is no finite number"},
         {"v 0 . 0\n", "text:1: coordinate \".\" is no finite number"},
         {"v 0 1e 0\n", "text:1: coordinate \"1e\" is no finite number"},
-        {"v 0 1e31 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "text:1: coordinate 1e+31 is beyond 1e+30"},
+        {"v 0 1e37 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "text:1: coordinate 1e+37 is beyond 1e+36"},
         {"v 1 2 3 4 5 6 7 8 9\n", "text:1: more numbers"},
         {"vt x\n", "text:1: texture coordinate \"x\" is no finite number"},
         {SQUARE "f 1 2 3 4\nt\n", "text:6: a tag line without a tag"},
@@ -261,7 +261,7 @@ static void check_create(void) {
     CHECK(qp_mesh_create(NULL, &m, &err) == QP_BAD_INPUT && m == NULL);
     broken = desc;
     double far[12] = {0};
-    far[7] = -1e31;
+    far[7] = -1e37;
     broken.positions = far;
     CHECK(qp_mesh_create(&broken, &m, &err) == QP_BAD_INPUT && strstr(err.message, "vertex 2") != NULL);
     broken = desc;
