@@ -60,6 +60,10 @@ run eval "$cube" --tolerance 1e-5 --tess 4 --device host --json
 check "eval --tolerance, too few" [ "$code" -eq 0 ]
 value 'o["bound"] > 1e-5 and o["patches_over_tolerance"] == 6 and o["factor_max"] == 4'
 check "a warning says so" grep -q '6 patches need larger factors' "$work/stderr"
+run sample "$cube" --patch 0 --uv 0.001,0.0003 --tolerance 1e-3 --device host --json
+check "sample --tolerance" [ "$code" -eq 0 ]
+keys "sample --tolerance" bound samples
+value '0 < o["bound"] <= 1e-3 and o["samples"][0]["flags"] == 1'
 run watertight gen:prism --tolerance 1e-2 --spacing fractional_odd --device host
 check "watertight --tolerance" [ "$code" -eq 0 ]
 run eval "$cube" --tolerance 0
