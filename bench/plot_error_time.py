@@ -119,7 +119,7 @@ def legend_handles(used, tolerances):
     handles = [dot(FLOAT, FLOAT), dot("white", FLOAT), dot(DOUBLE, DOUBLE), dot("white", DOUBLE),
                Line2D([], [], color="#7a4b00", linewidth=1.6)]
     labels = ["quadplan, float", "quadplan, float, no exact tail", "quadplan, double",
-              "quadplan, double, no exact tail", "quadplan's Pareto front"]
+              "quadplan, double, no exact tail", "quadplan's Pareto front; shaded: beyond it"]
     if tolerances:
         handles[4:4] = [dot("#F0E442", FLOAT, "D"), dot("#F0E442", DOUBLE, "D")]
         labels[4:4] = ["quadplan, float, tolerances", "quadplan, double, tolerances"]
