@@ -20,6 +20,14 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* From long double, so that the last bit does not depend on the C library's version or on what the processor can do. */
+static double cosine(double x) {
+    return (double)cosl((long double)x);
+}
+static double sine(double x) {
+    return (double)sinl((long double)x);
+}
+
 static const double pi = 3.14159265358979323846;
 
 /* Masks over the vertex, its spokes, its diagonals and the ends of a crease through it: [mask_size()]. */
@@ -49,11 +57,11 @@ static void smooth_masks(uint32_t n, uint32_t first, masks *m) {
         return;
     }
     double step = 2.0 * pi / d;
-    double a = 1.0 + cos(step) + cos(pi / d) * sqrt(18.0 + 2.0 * cos(step));
+    double a = 1.0 + cosine(step) + cosine(pi / d) * sqrt(18.0 + 2.0 * cosine(step));
     for (uint32_t j = 0; j < n; ++j) {
         double t = step * ((double)j - first), next = step * ((double)j + 1.0 - first);
-        e1[j] = a * cos(t), e2[j] = a * sin(t);
-        f1[j] = cos(t) + cos(next), f2[j] = sin(t) + sin(next);
+        e1[j] = a * cosine(t), e2[j] = a * sine(t);
+        f1[j] = cosine(t) + cosine(next), f2[j] = sine(t) + sine(next);
     }
 }
 
@@ -130,13 +138,15 @@ static void crease_masks(const qp_fan *fan, uint32_t begin, uint32_t faces, mask
     if (!m->has_tangents) return;
     m->t1[1 + begin] = 1.0;
     m->t1[1 + end] = -1.0;
-    double theta = pi / faces, a = 1.0 + cos(theta) + cos(0.5 * theta) * sqrt(18.0 + 2.0 * cos(theta));
-    double ends = (sin(theta) * (a + 4.0) - 2.0 / tan(0.5 * theta) * (a + 2.0)) / a, sum = 2.0 * ends;
+    double theta = pi / faces,
+           a = 1.0 + cosine(theta) + cosine(0.5 * theta) * sqrt(18.0 + 2.0 * cosine(theta));
+    double ends = (sine(theta) * (a + 4.0) - 2.0 * cosine(0.5 * theta) / sine(0.5 * theta) * (a + 2.0)) / a,
+           sum = 2.0 * ends;
     m->t2[1 + begin] = m->t2[1 + end] = ends;
     for (uint32_t j = 0; j < faces; ++j) {
         uint32_t spoke = (begin + j) % spokes, face = (begin + j) % fan->faces;
-        if (j > 0) m->t2[1 + spoke] = a * sin(j * theta);
-        m->t2[1 + spokes + face] = sin(j * theta) + sin((j + 1) * theta);
+        if (j > 0) m->t2[1 + spoke] = a * sine(j * theta);
+        m->t2[1 + spokes + face] = sine(j * theta) + sine((j + 1) * theta);
         sum += m->t2[1 + spokes + face] + (j > 0 ? m->t2[1 + spoke] : 0.0);
     }
     m->t2[0] = -sum;
