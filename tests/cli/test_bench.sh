@@ -12,7 +12,9 @@ for option in samples repeats peers max-level threads json csv chart seed; do
 done
 
 small=(bench error-time gen:cube --device host --max-level 2 --repeats 2 --samples 8 --seed 3)
-run "${small[@]}" --json - --csv "$work/out.csv"
+# LeakSanitizer itself crashes on the thread-local storage of the threads that Embree leaves running; the other runs,
+# without Embree, are searched for leaks.
+ASAN_OPTIONS="${ASAN_OPTIONS:+$ASAN_OPTIONS:}detect_leaks=0" run "${small[@]}" --json - --csv "$work/out.csv"
 check "error-time" [ "$code" -eq 0 ]
 keys error-time mesh faces patches samples samples_per_patch seed repeats threads device configurations left_out \
     peers_beyond_front
