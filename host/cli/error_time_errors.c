@@ -147,5 +147,9 @@ qp_status et_peer_errors(et_run *run, et_configuration *c, qp_error *err) {
     qp_parallel(run->count, 4096, read_vertices, &j);
     const qp_stream stream = {
         .precision = QP_DOUBLE, .n_samples = run->count, .vertices = run->known->vertices};
-    return measure(run, c, stream, c->precision == QP_DOUBLE ? EXACT : PLAIN_FLOAT, err);
+    qp_status status = measure(run, c, stream, c->precision == QP_DOUBLE ? EXACT : PLAIN_FLOAT, err);
+    c->apart = 0;
+    for (uint64_t i = 0; i < run->count && c->peer->apart != NULL; ++i) c->apart += c->peer->apart[i];
+    c->nonfinite -= c->nonfinite < c->apart ? c->nonfinite : c->apart;
+    return status;
 }

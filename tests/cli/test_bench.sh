@@ -50,6 +50,14 @@ value '{c["series"] for c in o["configurations"] if c["library"] != "quadplan"} 
 run "${small[@]}" --peers none --clock processor --json -
 value 'o["clock"] == "processor" and all(c["ns_per_sample"] > 0 for c in o["configurations"])'
 
+# Where a peer means another surface is no error of its; here it is at the corners of one face.
+if [ -e "$(dirname "$QUADPLAN_PROGRAM")/quadplan_embree.so" ]; then
+    ASAN_OPTIONS="${ASAN_OPTIONS:+$ASAN_OPTIONS:}detect_leaks=0" run bench error-time gen:terrain --device host \
+        --max-level 1 --repeats 1 --samples 4 --peers embree --json -
+    value 'all(c["nonfinite"] == 0 for c in o["configurations"])'
+    value 'all(c["apart"] > 0 and c["position_max"] < 1e-6 for c in o["configurations"] if c["series"] == "embree")'
+fi
+
 # A peer's series ends, and says so, where its set-up takes too long.
 run "${small[@]}" --peers bfr-double --setup-limit 0 --json -
 value 'any(s["series"] == "bfr-double" and s["from_level"] == 2 and "set-up" in s["reason"] for s in o["left_out"])'
