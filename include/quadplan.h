@@ -164,10 +164,9 @@ typedef enum qp_precision { QP_FLOAT = 0, QP_DOUBLE = 1 } qp_precision;
 
 typedef struct qp_device qp_device;
 
-/* which: NULL or "" for the default (environment variable QUADPLAN_DEVICE; else PoCL's CPU device; else the first that has double and
- * rounds correctly; else the first), "host" for
- * the kernels compiled as C into the library, a number "P.D" (platform.device), or part of a device's name.
- */
+/* which: NULL or "" for the default (environment variable QUADPLAN_DEVICE; else PoCL's CPU device; else the first
+ * that has double and rounds correctly; else the first), "host" for the kernels compiled as C into the library, a
+ * number "P.D" (platform.device), or part of a device's name. */
 QP_API qp_status qp_device_open(const char *which, qp_device **device, qp_error *err);
 QP_API void qp_device_free(qp_device *device);
 /* Name, owned by the device. */
