@@ -49,13 +49,14 @@ refuses "picture in a missing folder" 3 "nowhere/x.png: " render "$scene" --devi
     -o "$work/nowhere/x.png"
 
 refuses "no such device" 3 "nonesuch" eval "$cube" --device nonesuch
+vendors=${OCL_ICD_VENDORS-}
 export OCL_ICD_VENDORS=$work/no-vendors
 refuses "no OpenCL device" 3 "OpenCL" eval "$cube"
 run eval "$cube" --device host --json
 check "host needs no OpenCL device" [ "$code" -eq 0 ]
 run devices
 check "devices without OpenCL" [ "$code" -eq 0 ]
-unset OCL_ICD_VENDORS
+if [ -n "$vendors" ]; then OCL_ICD_VENDORS=$vendors; else unset OCL_ICD_VENDORS; fi
 
 refuses "folder missing" 3 "nowhere/x.obj: " gen cube -o "$work/nowhere/x.obj"
 ln -s /dev/full "$work/full.obj"
