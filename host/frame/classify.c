@@ -1,23 +1,17 @@
 #include "host/frame/classify.h"
-
-#include <math.h>
-
-/* 1 - x */
-static double mirrored(double x) {
-    return x == 0.5 ? x : -x;
-}
+#include "host/frame/coordinate.h"
 
 void qp_rotate_uv(uint32_t rotation, double *u, double *v) {
     double a = *u, b = *v;
     switch (rotation & 3u) {
     case 1:
-        *u = b, *v = mirrored(a);
+        *u = b, *v = qp_coordinate_mirrored(a);
         break;
     case 2:
-        *u = mirrored(a), *v = mirrored(b);
+        *u = qp_coordinate_mirrored(a), *v = qp_coordinate_mirrored(b);
         break;
     case 3:
-        *u = mirrored(b), *v = a;
+        *u = qp_coordinate_mirrored(b), *v = a;
         break;
     default:
         break;
@@ -28,8 +22,7 @@ void qp_rotate_uv(uint32_t rotation, double *u, double *v) {
  * place there. */
 static uint32_t enter_half(double *x, uint32_t tie) {
     uint32_t upper = signbit(*x) || (*x == 0.5 && !tie);
-    double t = 2.0 * fabs(*x), lower = t <= 0.5 ? t : -(1.0 - t);
-    *x = upper ? mirrored(lower) : lower;
+    *x = qp_coordinate_in_half(*x, upper != 0);
     return upper;
 }
 

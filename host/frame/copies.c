@@ -1,7 +1,7 @@
 /* Lists of copies from owners' samples, and the copying. */
+#include "host/frame/coordinate.h"
 #include "host/frame/share.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -9,14 +9,6 @@
 
 static double signed_of(double x) {
     return x <= 0.5 ? x : -(1.0 - x);
-}
-static double mirrored(double s) {
-    return s == 0.5 ? s : -s;
-}
-/* 2x - upper. */
-static double in_half(double s, bool upper) {
-    const double d = 2.0 * fabs(s), lower = d <= 0.5 ? d : -(1.0 - d);
-    return upper ? mirrored(lower) : lower;
 }
 
 /* Place t along an edge of a patch. */
@@ -27,9 +19,9 @@ static qp_ghost ghost_on_edge(qp_side side, double t) {
     case 1:
         return (qp_ghost){side.patch, -0.0, t};
     case 2:
-        return (qp_ghost){side.patch, mirrored(t), -0.0};
+        return (qp_ghost){side.patch, qp_coordinate_mirrored(t), -0.0};
     default:
-        return (qp_ghost){side.patch, 0.0, mirrored(t)};
+        return (qp_ghost){side.patch, 0.0, qp_coordinate_mirrored(t)};
     }
 }
 static qp_ghost ghost_at_corner(qp_side side) {
@@ -292,12 +284,12 @@ qp_status qp_share_point(const qp_share *share, uint32_t patch, double u, double
     const qp_edge_owner owner = qp_share_edge(share, face, child, edge);
     if (owner.own) return QP_OK;
     double t = signed_of(at_u ? v : u);
-    if (edge >= 2) t = mirrored(t);
-    if (owner.reversed) t = mirrored(t);
+    if (edge >= 2) t = qp_coordinate_mirrored(t);
+    if (owner.reversed) t = qp_coordinate_mirrored(t);
     uint32_t half = 0;
     if (owner.split) {
         half = signbit(t) != 0;
-        t = in_half(t, half != 0);
+        t = qp_coordinate_in_half(t, half != 0);
     }
     return append(copies, ghosts, to, ghost_on_edge(owner.side[half], t),
                   QP_SHARE_POSITION | (owner.normal ? QP_SHARE_NORMAL : QP_SHARE_DEPTH), err);
