@@ -133,14 +133,6 @@ qp_status evaluate(qp_peer *peer, qp_error *err) {
     });
 }
 
-void read(const qp_peer *peer, uint64_t i, double p[3], double du[3], double dv[3]) {
-    double *const to[3] = {p, du, dv};
-    for (uint64_t c = 0; c < 9; ++c)
-        to[c / 3][c % 3] = peer->series->in_double
-                               ? static_cast<const double *>(peer->task->out)[9 * i + c]
-                               : (double)static_cast<const float *>(peer->task->out)[9 * i + c];
-}
-
 void destroy(qp_peer *peer) {
     if (!peer) return;
     if (peer->series->in_double)
@@ -152,9 +144,11 @@ void destroy(qp_peer *peer) {
 } // namespace
 
 extern "C" const qp_peer_series qp_osd_bfr_series[QP_OSD_BFR_SERIES] = {
-    {"bfr-default", "OpenSubdiv " QP_OSD_VERSION, 0, 0, true, false, 0, create, evaluate, read, destroy},
-    {"bfr", "OpenSubdiv " QP_OSD_VERSION, 1, 10, true, false, 0, create, evaluate, read, destroy},
-    {"bfr-double-default", "OpenSubdiv " QP_OSD_VERSION, 0, 0, true, true, 0, create, evaluate, read,
+    {"bfr-default", "OpenSubdiv " QP_OSD_VERSION, 0, 0, true, false, 0, create, evaluate, qp_osd_read,
      destroy},
-    {"bfr-double", "OpenSubdiv " QP_OSD_VERSION, 1, 10, true, true, 0, create, evaluate, read, destroy},
+    {"bfr", "OpenSubdiv " QP_OSD_VERSION, 1, 10, true, false, 0, create, evaluate, qp_osd_read, destroy},
+    {"bfr-double-default", "OpenSubdiv " QP_OSD_VERSION, 0, 0, true, true, 0, create, evaluate, qp_osd_read,
+     destroy},
+    {"bfr-double", "OpenSubdiv " QP_OSD_VERSION, 1, 10, true, true, 0, create, evaluate, qp_osd_read,
+     destroy},
 };

@@ -15,16 +15,6 @@ using namespace qp_peer_osd;
 
 namespace {
 
-struct Point {
-    double p[3];
-    void Clear(void * = nullptr) {
-        p[0] = p[1] = p[2] = 0;
-    }
-    void AddWithWeight(const Point &from, double weight) {
-        for (int c = 0; c < 3; ++c) p[c] += weight * from.p[c];
-    }
-};
-
 /* Refined positions, level after level, from those of the base mesh; points has room for all. */
 void interpolate(const Far::TopologyRefiner &refiner, const double *positions, std::vector<Point> &points) {
     for (size_t v = 0; v < (size_t)refiner.GetLevel(0).GetNumVertices(); ++v)

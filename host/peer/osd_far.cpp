@@ -19,16 +19,6 @@ using EndCap = Far::PatchTableFactory::Options::EndCapType;
 
 namespace {
 
-struct Point {
-    double p[3];
-    void Clear(void * = nullptr) {
-        p[0] = p[1] = p[2] = 0;
-    }
-    void AddWithWeight(const Point &from, double weight) {
-        for (int c = 0; c < 3; ++c) p[c] += weight * from.p[c];
-    }
-};
-
 /* Patch table and stencils of all points that are not the mesh's own, and where the samples lie. */
 template <typename REAL> struct Tables {
     std::unique_ptr<Far::PatchTable> patches;
@@ -226,14 +216,6 @@ qp_status evaluate(qp_peer *peer, qp_error *err) {
     });
 }
 
-void read(const qp_peer *peer, uint64_t i, double p[3], double du[3], double dv[3]) {
-    double *const to[3] = {p, du, dv};
-    for (uint64_t c = 0; c < 9; ++c)
-        to[c / 3][c % 3] = peer->series->in_double
-                               ? static_cast<const double *>(peer->task->out)[9 * i + c]
-                               : (double)static_cast<const float *>(peer->task->out)[9 * i + c];
-}
-
 void destroy(qp_peer *peer) {
     delete static_cast<Evaluator *>(peer);
 }
@@ -244,7 +226,7 @@ void destroy(qp_peer *peer) {
 #define FAR_SERIES(name, parallel, in_double, evaluator, cap)                                                \
     {                                                                                                        \
         name, FAR_LIBRARY, 1, 10, parallel, in_double, (evaluator)*QP_OSD_CAPS + (cap), create, evaluate,    \
-            read, destroy                                                                                    \
+            qp_osd_read, destroy                                                                             \
     }
 
 extern "C" const qp_peer_series qp_osd_far_series[QP_OSD_FAR_SERIES] = {

@@ -18,6 +18,17 @@ namespace qp_peer_osd {
 /* The mesh goes over with its tags as given, not as made effective. Null when OpenSubdiv refuses it. */
 std::unique_ptr<Far::TopologyRefiner> make_refiner(const qp_mesh *mesh);
 
+/* A position, as Far interpolates. */
+struct Point {
+    double p[3];
+    void Clear(void * = nullptr) {
+        p[0] = p[1] = p[2] = 0;
+    }
+    void AddWithWeight(const Point &from, double weight) {
+        for (int c = 0; c < 3; ++c) p[c] += weight * from.p[c];
+    }
+};
+
 /* QP_BAD_INPUT with the last thing OpenSubdiv said on this thread. */
 qp_status refused(qp_error *err);
 /* Forgets that, and listens from now on: OpenSubdiv reports through callbacks and null pointers. */
