@@ -173,6 +173,101 @@ QP_API void qp_device_free(qp_device *device);
 QP_API const char *qp_device_name(const qp_device *device);
 QP_API int qp_device_has_double(const qp_device *device);
 
+/* ---- Where control points live between hull and domain (sections 4 and 8 of the paper)
+ * -------------------------------------------------------------------------------------------------- */
+
+/* All kinds give the same bits. */
+typedef enum qp_supports_kind {
+    QP_SUPPORTS_SCRATCH =
+        0, /* a place of its own for every patch of a launch: the worst case (section 4.3) */
+    QP_SUPPORTS_RING =
+        1, /* a ring buffer, allocated by the hull stage and released by the domain stage (section 8.1) */
+    QP_SUPPORTS_CACHE =
+        2 /* scratch, filled from a cache of control points that is kept between evaluations (section 8.2) */
+} qp_supports_kind;
+
+typedef enum qp_schedule {
+    QP_SCHEDULE_FUSED = 0, /* a patch's work-group runs hull and then domain */
+    QP_SCHEDULE_STREAMED =
+        1 /* launches of the hull stage fill the ring, launches of the domain stage drain it, overlapped */
+} qp_schedule;
+
+typedef enum qp_retirement {
+    QP_RETIRE_IN_ORDER =
+        0, /* a patch keeps its place, and its work-group, until all patches issued before it are done */
+    QP_RETIRE_OUT_OF_ORDER =
+        1 /* a patch ends when it is done; its part of the ring is free once all older parts are */
+} qp_retirement;
+
+typedef enum qp_issue_order {
+    QP_ISSUE_BY_PLAN = 0, /* patches of one plan follow each other, whose stencils then stay in caches */
+    QP_ISSUE_BY_PATCH = 1 /* in the order of the mesh, as a rasterizer that keeps order has it */
+} qp_issue_order;
+
+typedef enum qp_cache_policy {
+    QP_CACHE_ALL =
+        0, /* the paper's: a place for every distinct control point, and a valid bit each; cache_bytes is not used */
+    QP_CACHE_DIRECT = 1, /* bounded, direct-mapped */
+    QP_CACHE_CLOCK = 2,  /* bounded, set-associative, second chance (clock) within a set */
+    QP_CACHE_LEVELS = 3  /* clock, but points that fewer patches share never drive out points that more do */
+} qp_cache_policy;
+
+/* Zero-initialise for scratch. */
+typedef struct qp_supports_options {
+    qp_supports_kind kind;
+    uint64_t
+        ring_bytes; /* of QP_SUPPORTS_RING: at least what the largest patch of an evaluation needs, else QP_BAD_INPUT says how much
+                            that is; no ring is needed where no patch needs one */
+    qp_schedule schedule;
+    qp_retirement retirement;
+    qp_issue_order issue_order;
+    uint64_t cache_bytes; /* of QP_SUPPORTS_CACHE, with the bounded policies: points and tags together */
+    qp_cache_policy cache_policy;
+    int canaries; /* a pattern around the ring and between its allocations is checked; an overrun ends in QP_CHECK_FAILED */
+    int trace; /* the stream gets a trace */
+} qp_supports_options;
+
+/* What happened to the control points of one evaluation, counted by the kernels. Bytes are of control points (4 reals each) unless
+ * said otherwise. */
+typedef struct qp_supports_report {
+    qp_supports_kind kind;
+    uint64_t capacity_bytes;   /* of the scratch, the ring or the cache */
+    uint64_t worst_case_bytes; /* scratch for all patches of the evaluation at once */
+    uint64_t largest_bytes;    /* of one patch */
+    uint64_t
+        peak_bytes; /* most that were allocated and not yet released at one time; of a cache, that were valid */
+    uint64_t allocations, allocated_bytes;
+    /* Ring. */
+    uint64_t stalls; /* allocations that had to wait for room */
+    double
+        stall_ms; /* how long they waited, all together; 0 where the device has no clock that kernels can read */
+    uint64_t wraps;        /* times the ring began anew at its start */
+    uint64_t wasted_bytes; /* skipped at its end, all together (fragmentation) */
+    uint64_t in_flight;    /* most patches at one time */
+    /* Cache, in control points. */
+    uint64_t points_needed;   /* asked for by patches */
+    uint64_t points_computed; /* hulls of scratch and ring compute all they need */
+    uint64_t hits, misses_cold, misses_capacity, misses_conflict;
+    uint64_t duplicates;  /* of points_computed: by two work-groups at the same time */
+    uint64_t invalidated; /* points that positions which have moved made invalid, before this evaluation */
+    uint64_t index_bytes; /* of the cache's tables, apart from capacity_bytes */
+} qp_supports_report;
+
+/* Ticks of a patch on its way; .. of the clock that qp_trace names. */
+typedef struct qp_trace_patch {
+    uint32_t patch; /* in ptex order */
+    uint32_t
+        slot; /* lowest warp slot that was free when it began; in the streamed schedule of the hull's slots */
+    uint32_t points, samples;
+    uint64_t start, allocated, hulled, done, retired;
+} qp_trace_patch;
+
+typedef struct qp_trace {
+    uint64_t n_patches;
+    const qp_trace_patch *patches; /* in the order they were issued */
+    double ticks_per_ms;           /* 0: ticks only count events, in their order */
+} qp_trace;
+
 /* ---- Frames
  * ------------------------------------------------------------------------------------------------- */
 
@@ -224,10 +319,14 @@ typedef struct qp_stream {
     double hull_ms, domain_ms, frame_ms; /* of this evaluation; frame_ms is the whole without set-up */
     uint64_t support_bytes;              /* control points held */
     uint64_t hash;                       /* of the bytes of vertices; 0 unless asked for */
-    double bound;            /* with a tolerance: proven bound of the error of the triangles, or of points, of the diagonal, rounding
+    double
+        bound; /* with a tolerance: proven bound of the error of the triangles, or of points, of the diagonal, rounding
                                 included; 0 without one */
-    uint64_t over_tolerance; /* patches whose bound is larger than the tolerance, as not even the largest factor is enough */
+    uint64_t
+        over_tolerance; /* patches whose bound is larger than the tolerance, as not even the largest factor is enough */
     float factor_min, factor_mean, factor_max; /* with a tolerance: of the edges */
+    qp_supports_report supports;
+    const qp_trace *trace; /* NULL unless asked for */
 } qp_stream;
 
 typedef struct qp_frame_options {
@@ -240,6 +339,7 @@ typedef struct qp_frame_options {
      * than this times the diagonal; stream.bound is what they err by at most, rounding included. Normals have no bound. */
     double tolerance;
     int no_exact_tail; /* samples below the depth of the surface's plans are approximated and flagged (for comparison) */
+    qp_supports_options supports;
 } qp_frame_options;
 
 typedef struct qp_frame qp_frame;

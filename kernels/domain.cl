@@ -354,17 +354,17 @@ QP_FUNCTION void QP_NAME(replacement_write)(const QP_NAME(replacement) * r, real
     normal[2] = n.z + QP_R(0.0);
 }
 
-__kernel void QP_NAME(domain)(__global const uint *heads, __global const uint *trees,
-                              __global const real *reals, __global const uint *rings,
-                              __global const real *positions, __global const uint *entries, uint first_entry,
-                              __global const real *support, __global const real *grid_u,
-                              __global const real *grid_v, __global real *vertices, __global uchar *flags,
-                              __global real *derivatives, uint want_derivatives QP_GROUP) {
-    __global const uint *entry = entries + ((ulong)first_entry + get_group_id(0)) * QP_ENTRY_WORDS;
+/* All samples of an entry, by the whole work-group, from its control points. */
+QP_FUNCTION void QP_NAME(domain_patch)(__global const uint *heads, __global const uint *trees,
+                                       __global const real *reals, __global const uint *rings,
+                                       __global const real *positions, __global const uint *entry,
+                                       __global const real4 *points, __global const real *grid_u,
+                                       __global const real *grid_v, __global real *vertices,
+                                       __global uchar *flags, __global real *derivatives,
+                                       uint want_derivatives) {
     __global const uint *head = heads + entry[QP_ENTRY_HEAD];
     __global const uint *tree = trees + head[QP_HEAD_TREE];
     __global const real *constants = reals + head[QP_HEAD_REALS];
-    __global const real4 *points = (__global const real4 *)support + QP_ENTRY_WIDE(entry, QP_ENTRY_SUPPORT);
     __global const real *us = grid_u + QP_ENTRY_WIDE(entry, QP_ENTRY_GRID);
     __global const real *vs = grid_v + QP_ENTRY_WIDE(entry, QP_ENTRY_GRID);
     __global const real *first = positions + QP_POSITION_FIRST;
@@ -449,4 +449,17 @@ __kernel void QP_NAME(domain)(__global const uint *heads, __global const uint *t
                 evaluations = block + QP_REPLACE_STEPS * block;
         }
     }
+}
+
+__kernel void QP_NAME(domain)(__global const uint *heads, __global const uint *trees,
+                              __global const real *reals, __global const uint *rings,
+                              __global const real *positions, __global const uint *entries, uint first_entry,
+                              __global const real *support, __global const real *grid_u,
+                              __global const real *grid_v, __global real *vertices, __global uchar *flags,
+                              __global real *derivatives, uint want_derivatives QP_GROUP) {
+    __global const uint *entry = entries + ((ulong)first_entry + get_group_id(0)) * QP_ENTRY_WORDS;
+    QP_NAME(domain_patch)
+    (heads, trees, reals, rings, positions, entry,
+     (__global const real4 *)support + QP_ENTRY_WIDE(entry, QP_ENTRY_SUPPORT), grid_u, grid_v, vertices, flags,
+     derivatives, want_derivatives);
 }

@@ -15,17 +15,14 @@
 #error "a chunk is to be whole parts"
 #endif
 
-__kernel void QP_NAME(hull)(__global const uint *heads, __global const real *reals,
-                            __global const uint *rings, __global const real *positions,
-                            __global const uint *entries, uint first_entry, __global real *support QP_GROUP) {
-    __local real ring_x[QP_HULL_CHUNK];
-    __local real ring_y[QP_HULL_CHUNK];
-    __local real ring_z[QP_HULL_CHUNK];
-    __global const uint *entry = entries + ((ulong)first_entry + get_group_id(0)) * QP_ENTRY_WORDS;
+/* The first `rows` points of an entry, by the whole work-group, into `out`. ring_x, ring_y, ring_z: QP_HULL_CHUNK reals of local memory each.
+ * Ends without a barrier: what items wrote is theirs until then. */
+QP_FUNCTION void QP_NAME(hull_patch)(__global const uint *heads, __global const real *reals,
+                                     __global const uint *rings, __global const real *positions,
+                                     __global const uint *entry, uint rows, __global real *out,
+                                     __local real *ring_x, __local real *ring_y, __local real *ring_z) {
     __global const uint *head = heads + entry[QP_ENTRY_HEAD];
     __global const uint *ring = rings + QP_ENTRY_WIDE(entry, QP_ENTRY_RING);
-    __global real *out = support + 4u * QP_ENTRY_WIDE(entry, QP_ENTRY_SUPPORT);
-    const uint rows = entry[QP_ENTRY_ROWS];
     const uint ring_size = head[QP_HEAD_RING];
     const ulong points = head[QP_HEAD_POINTS];
     const int shares = (head[QP_HEAD_FLAGS] & QP_PLAN_MODES) != 0;
@@ -88,4 +85,16 @@ __kernel void QP_NAME(hull)(__global const uint *heads, __global const real *rea
             }
         }
     }
+}
+
+__kernel void QP_NAME(hull)(__global const uint *heads, __global const real *reals,
+                            __global const uint *rings, __global const real *positions,
+                            __global const uint *entries, uint first_entry, __global real *support QP_GROUP) {
+    __local real ring_x[QP_HULL_CHUNK];
+    __local real ring_y[QP_HULL_CHUNK];
+    __local real ring_z[QP_HULL_CHUNK];
+    __global const uint *entry = entries + ((ulong)first_entry + get_group_id(0)) * QP_ENTRY_WORDS;
+    QP_NAME(hull_patch)
+    (heads, reals, rings, positions, entry, entry[QP_ENTRY_ROWS],
+     support + 4u * QP_ENTRY_WIDE(entry, QP_ENTRY_SUPPORT), ring_x, ring_y, ring_z);
 }

@@ -21,6 +21,18 @@
 #define QP_FUNCTION static inline __attribute__((always_inline))
 #define QP_GROUP /* a kernel's last parameter on the host: which work-group it is */
 
+/* Words that work-groups share. OpenCL 1.2's atomics order nothing else: qp_release() comes after the writes of a work-item
+ * that others are to see, and before the atomic that tells them; qp_acquire() after the atomic that told, and before the reads. */
+#define qp_atomic_load(p) atomic_add((p), 0u)
+#define qp_atomic_store(p, value) ((void)atomic_xchg((p), (value)))
+#define qp_atomic_add(p, value) atomic_add((p), (value))
+#define qp_atomic_sub(p, value) atomic_sub((p), (value))
+#define qp_atomic_max(p, value) atomic_max((p), (value))
+#define qp_atomic_exchange(p, value) atomic_xchg((p), (value))
+#define qp_atomic_swap(p, expected, value) (atomic_cmpxchg((p), (expected), (value)) == (expected))
+#define qp_release() mem_fence(CLK_GLOBAL_MEM_FENCE)
+#define qp_acquire() mem_fence(CLK_GLOBAL_MEM_FENCE)
+
 #else
 
 #include <math.h>
@@ -44,6 +56,22 @@
 #define QP_FUNCTION static inline __attribute__((always_inline))
 #endif
 #define QP_GROUP , size_t qp_group
+#define qp_atomic_load(p) __atomic_load_n((p), __ATOMIC_ACQUIRE)
+#define qp_atomic_store(p, value) __atomic_store_n((p), (value), __ATOMIC_RELEASE)
+#define qp_atomic_add(p, value) __atomic_fetch_add((p), (value), __ATOMIC_ACQ_REL)
+#define qp_atomic_sub(p, value) __atomic_fetch_sub((p), (value), __ATOMIC_ACQ_REL)
+#define qp_atomic_exchange(p, value) __atomic_exchange_n((p), (value), __ATOMIC_ACQ_REL)
+#define qp_atomic_max(p, value) qp_host_atomic_max((p), (value))
+#define qp_atomic_swap(p, expected, value) qp_host_atomic_swap((p), (expected), (value))
+#define qp_release() ((void)0)
+#define qp_acquire() ((void)0)
+static inline void qp_host_atomic_max(volatile uint32_t *p, uint32_t value) {
+    uint32_t seen = __atomic_load_n(p, __ATOMIC_RELAXED);
+    while (seen < value && !__atomic_compare_exchange_n(p, &seen, value, 0, __ATOMIC_ACQ_REL, __ATOMIC_RELAXED)) {}
+}
+static inline int qp_host_atomic_swap(volatile uint32_t *p, uint32_t expected, uint32_t value) {
+    return __atomic_compare_exchange_n(p, &expected, value, 0, __ATOMIC_ACQ_REL, __ATOMIC_ACQUIRE);
+}
 #define uint uint32_t
 #define ulong uint64_t
 #define uchar uint8_t
