@@ -23,8 +23,14 @@ typedef enum cli_kind {
     CLI_COUNT,  /* uint64_t in [low, high] */
     CLI_REAL,   /* double in [low, high] */
     CLI_CHOICE, /* int: index into the words of `argument`, separated by | */
-    CLI_SIZES   /* cli_sizes: AxBxC */
+    CLI_SIZES,  /* cli_sizes: AxBxC */
+    CLI_BYTES,  /* uint64_t in [low, high]: 64K, 1M, 2G are 2^10, 2^20, 2^30 */
+    CLI_BYTE_RANGE /* cli_byte_range in [low, high]: 64K..32M, or one number */
 } cli_kind;
+
+typedef struct cli_byte_range {
+    uint64_t first, last; /* first <= last */
+} cli_byte_range;
 
 typedef struct cli_sizes {
     unsigned count;
@@ -59,6 +65,10 @@ bool cli_sizes_read(const char *text, cli_sizes *sizes);
 /* The whole of text as a number; false on anything else, NaN and infinity included. */
 bool cli_real_read(const char *text, double *value);
 bool cli_count_read(const char *text, uint64_t *value);
+/* "65536", "64K", "1M", "2G", "1T". */
+bool cli_bytes_read(const char *text, uint64_t *value);
+/* "64K..32M", or "1M" for a range of one. */
+bool cli_byte_range_read(const char *text, cli_byte_range *range);
 
 /* ---- The mesh argument (mesh_argument.c) ---- */
 typedef struct cli_mesh_options {

@@ -46,6 +46,35 @@ bool cli_sizes_read(const char *text, cli_sizes *sizes) {
     return false;
 }
 
+/* The number of bytes at *text, which is moved behind it. */
+static bool read_bytes(const char **text, uint64_t *value) {
+    static const char suffixes[] = "KMGT";
+    if (**text < '0' || **text > '9') return false;
+    char *end;
+    errno = 0;
+    unsigned long long n = strtoull(*text, &end, 10);
+    if (errno != 0) return false;
+    const char *suffix = *end == '\0' ? NULL : strchr(suffixes, *end);
+    const unsigned shift = suffix == NULL ? 0 : 10u * (unsigned)(suffix - suffixes + 1);
+    if (n > UINT64_MAX >> shift) return false;
+    *value = (uint64_t)n << shift;
+    *text = suffix == NULL ? end : end + 1;
+    return true;
+}
+
+bool cli_bytes_read(const char *text, uint64_t *value) {
+    return read_bytes(&text, value) && *text == '\0';
+}
+
+bool cli_byte_range_read(const char *text, cli_byte_range *range) {
+    if (!read_bytes(&text, &range->first)) return false;
+    range->last = range->first;
+    if (*text == '\0') return true;
+    if (strncmp(text, "..", 2) != 0) return false;
+    text += 2;
+    return read_bytes(&text, &range->last) && *text == '\0' && range->first <= range->last;
+}
+
 static void print_help(const cli_command *command, const cli_option *options) {
     printf("usage: quadplan %s [options] %s\n%s\n", command->name, command->arguments, command->summary);
     if (command->details != NULL) printf("\n%s\n", command->details);
@@ -76,6 +105,25 @@ static qp_status set_value(const cli_option *o, const char *text, qp_error *err)
             return qp_fail(err, QP_BAD_INPUT, "%s: '%s' is not a whole number from %.0f to %.0f", o->name,
                            text, o->low, o->high);
         *(uint64_t *)o->value = n;
+        break;
+    }
+    case CLI_BYTES: {
+        uint64_t n;
+        if (!cli_bytes_read(text, &n) || (double)n < o->low || (double)n > o->high)
+            return qp_fail(
+                err, QP_BAD_INPUT,
+                "%s: '%s' is not a number of bytes from %.0f to %.0f (64K, 1M, 2G are 2^10, 2^20, 2^30)",
+                o->name, text, o->low, o->high);
+        *(uint64_t *)o->value = n;
+        break;
+    }
+    case CLI_BYTE_RANGE: {
+        cli_byte_range range;
+        if (!cli_byte_range_read(text, &range) || (double)range.first < o->low ||
+            (double)range.last > o->high)
+            return qp_fail(err, QP_BAD_INPUT, "%s: '%s' is not of the form 64K..32M, from %.0f to %.0f bytes",
+                           o->name, text, o->low, o->high);
+        *(cli_byte_range *)o->value = range;
         break;
     }
     case CLI_REAL: {
