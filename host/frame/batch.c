@@ -54,6 +54,8 @@ static qp_status cut_batch(qp_frame *frame, size_t begin, size_t *end, uint32_t 
             break;
         batch->n_samples += item->samples;
         batch->points += points;
+        frame->all_points += points;
+        if (points > frame->largest_points) frame->largest_points = points;
         if (fast)
             ++batch->n_regular;
         else
@@ -63,6 +65,7 @@ static qp_status cut_batch(qp_frame *frame, size_t begin, size_t *end, uint32_t 
     batch->first_regular = *next_entry + batch->n_general;
     *next_entry += batch->n_general + batch->n_regular;
     if (batch->points > frame->peak_points) frame->peak_points = batch->points;
+    if (batch->n_general > frame->peak_patches) frame->peak_patches = batch->n_general;
     *end = i;
     return QP_OK;
 }
@@ -202,6 +205,21 @@ qp_status qp_frame_upload_layout(qp_frame *frame, qp_error *err) {
     return status;
 }
 
+qp_supports_report qp_frame_scratch_report(const qp_frame *frame) {
+    const uint64_t bytes = 4 * frame->real_size;
+    qp_supports_report report = {.kind = frame->options.supports.kind,
+                                 .capacity_bytes = frame->peak_points * bytes,
+                                 .worst_case_bytes = frame->all_points * bytes,
+                                 .largest_bytes = frame->largest_points * bytes,
+                                 .peak_bytes = frame->peak_points * bytes,
+                                 .allocated_bytes = frame->all_points * bytes,
+                                 .in_flight = frame->peak_patches,
+                                 .points_needed = frame->all_points,
+                                 .points_computed = frame->all_points};
+    for (size_t b = 0; b < frame->n_batches; ++b) report.allocations += frame->batches[b].n_general;
+    return report;
+}
+
 void qp_frame_drop_layout(qp_frame *frame) {
     for (size_t b = 0; b < frame->n_batches; ++b) {
         qp_buffer_free(frame->device, &frame->batches[b].vertices);
@@ -211,7 +229,7 @@ void qp_frame_drop_layout(qp_frame *frame) {
     free(frame->batches);
     frame->batches = NULL;
     frame->n_batches = 0;
-    frame->peak_points = 0;
+    frame->peak_points = frame->all_points = frame->largest_points = frame->peak_patches = 0;
     frame->tessellated = false;
     qp_layout_free(&frame->layout);
 }

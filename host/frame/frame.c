@@ -188,7 +188,8 @@ static qp_status evaluate(qp_frame *frame, qp_stream *stream, qp_error *err) {
                           .sample_patch = layout->sample_patch,
                           .n_triangles = layout->n_triangles,
                           .triangles = layout->triangles,
-                          .support_bytes = frame->peak_points * 4 * frame->real_size};
+                          .support_bytes = frame->peak_points * 4 * frame->real_size,
+                          .supports = qp_frame_scratch_report(frame)};
     const double start = qp_now_ms(), processor_start = qp_processor_ms();
     qp_status status = launch_batches(frame, &stream->hull_ms, &stream->domain_ms, err);
     /* Also after a failure: what was started writes its times into *stream. */

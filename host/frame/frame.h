@@ -88,7 +88,8 @@ struct qp_frame {
     qp_share *share;      /* NULL with no_sharing */
     size_t n_batches;
     qp_frame_batch *batches;
-    uint64_t peak_points;
+    uint64_t peak_points; /* of the batch with most of them */
+    uint64_t all_points, largest_points, peak_patches; /* of all batches, of one patch; patches of the fullest batch that have points */
     double processor_ms; /* of all threads, in what the last stream's frame_ms covers; for benchmarks */
 
     void *vertices; /* the stream's, page-aligned; grows only */
@@ -128,6 +129,9 @@ qp_status qp_frame_upload(qp_frame *frame, qp_buffer *buffer, const void *from, 
 
 /* Cuts the layout into batches and uploads it. */
 qp_status qp_frame_upload_layout(qp_frame *frame, qp_error *err);
+/* What is known before the kernels run of an evaluation of the layout that is uploaded, and holds for scratch; of other kinds, those
+ * who evaluate them put in what differs. */
+qp_supports_report qp_frame_scratch_report(const qp_frame *frame);
 /* Frees what qp_frame_upload_layout made, buffers that can be used again apart. */
 void qp_frame_drop_layout(qp_frame *frame);
 
