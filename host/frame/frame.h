@@ -41,6 +41,9 @@ typedef struct qp_frame_layout {
  * QP_BAD_INPUT for a factor that is not in [1, 64], QP_SYSTEM for memory. */
 qp_status qp_layout_tessellate(const qp_surface *surface, const qp_tessellation *tessellation,
                                const qp_share *share, bool want_triangles, qp_frame_layout *layout, qp_error *err);
+/* Its items alone, in order of patches, and how many samples and triangles they make; no array is filled, and no ghosts are added. */
+qp_status qp_layout_items(const qp_surface *surface, const qp_tessellation *tessellation, qp_frame_layout *layout,
+                          qp_error *err);
 /* Any points, grouped by patch. Errors: QP_BAD_INPUT names the first point that is none of a patch with a
  * surface. */
 qp_status qp_layout_points(const qp_surface *surface, uint64_t count, const uint32_t *patch, const double *uv,
@@ -107,7 +110,8 @@ typedef struct qp_frame_plan {
     const qp_plan *plan;
     uint32_t index;
     uint8_t rotation;
-    uint64_t ring;
+    uint64_t ring;             /* first word in rings on the device */
+    const qp_surface *surface; /* whose plan it is */
 } qp_frame_plan;
 qp_frame_plan qp_frame_plan_of(const qp_frame *frame, uint32_t patch);
 
@@ -121,6 +125,19 @@ qp_status qp_frame_grow_step(qp_frame *frame, uint8_t step, bool *changed, qp_er
 /* Chooses frame->light for the tolerance of the options, unless it is chosen. Uses patch_step. Errors: QP_SYSTEM for memory. */
 qp_status qp_frame_choose_light(qp_frame *frame, bool *changed, qp_error *err);
 void qp_frame_drop_deep(qp_frame *frame);
+/* rings.c: the 1-rings on the device. */
+qp_status qp_frame_upload_rings(qp_frame *frame, const qp_surface *const *surfaces, uint32_t n_surfaces,
+                                qp_error *err);
+/* Base vertex that a patch is relative to: what its plan's base is anchored to. */
+uint32_t qp_frame_origin(const qp_surface *surface, uint32_t patch);
+/* First word of a patch of a surface there, and the words of all (QP_RING_WORDS). */
+static inline uint64_t qp_frame_ring_word(const qp_surface *surface, uint32_t patch) {
+    return 2 * surface->patch_ring[patch] + 4 * (uint64_t)patch;
+}
+static inline uint64_t qp_frame_ring_words(const qp_surface *surface) {
+    return 2 * surface->ring_entries + 4 * (uint64_t)surface->mesh->n_patches;
+}
+
 /* Builds the kernels and uploads the plans of all surfaces. */
 qp_status qp_frame_upload_plans(qp_frame *frame, qp_error *err);
 /* Room for `bytes` in a buffer, and their copy there. */

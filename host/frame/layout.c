@@ -258,8 +258,8 @@ static qp_status place_ghosts(const qp_ghosts *ghosts, uint64_t first_point, qp_
     return QP_OK;
 }
 
-/* Items from the grids of the parts, and the arrays filled. */
-static qp_status expand(tessellation *t, bool want_triangles, qp_frame_layout *layout, qp_error *err) {
+/* Items from the grids of the parts. */
+static qp_status list_items(tessellation *t, qp_frame_layout *layout, qp_error *err) {
     const size_t n_grids = t->table.count, n_parts = (size_t)t->factors.first[t->surface->mesh->n_patches];
     t->grid_first = qp_alloc(n_grids, sizeof *t->grid_first, false);
     t->levels = qp_alloc(n_grids, sizeof *t->levels, false);
@@ -268,13 +268,21 @@ static qp_status expand(tessellation *t, bool want_triangles, qp_frame_layout *l
     if (t->grid_first == NULL || t->levels == NULL || t->part_triangle == NULL || layout->items == NULL)
         return qp_fail_memory(err, n_parts * sizeof *layout->items, "the patches of a frame");
     make_items(t, layout);
+    return QP_OK;
+}
+
+/* Items, and the arrays filled. */
+static qp_status expand(tessellation *t, bool want_triangles, qp_frame_layout *layout, qp_error *err) {
+    const size_t n_grids = t->table.count;
+    qp_status status = list_items(t, layout, err);
+    if (status != QP_OK) return status;
     if (want_triangles && layout->n_samples > UINT32_MAX)
         return qp_fail(err, QP_BAD_INPUT, "%llu samples are too many for triangles of 32-bit indices",
                        (unsigned long long)layout->n_samples);
     const uint64_t first_ghost_point = layout->grid_points;
     const size_t n_items = layout->n_items;
     qp_ghosts ghosts;
-    qp_status status = share_samples(t, layout, &ghosts, err);
+    status = share_samples(t, layout, &ghosts, err);
     layout->grid_points += ghosts.count;
     layout->n_evaluated = layout->n_samples + ghosts.count;
     if (status == QP_OK) status = alloc_layout(layout, want_triangles, err);
@@ -292,35 +300,52 @@ static qp_status expand(tessellation *t, bool want_triangles, qp_frame_layout *l
     return QP_OK;
 }
 
+/* The grids of the parts, distinct ones once; what it made is freed by free_tessellation(). */
+static qp_status make_tessellation(tessellation *t, const qp_tessellation *tess, qp_error *err) {
+    qp_status status = qp_factors_make(t->surface, tess, &t->factors, err);
+    if (status == QP_OK)
+        status = assign_grids(t->surface->mesh->n_patches, &t->factors, &t->table, &t->part_grid, err);
+    if (status != QP_OK) return status;
+    t->grids = qp_alloc(t->table.count, sizeof *t->grids, true);
+    t->rims = qp_alloc(t->table.count, sizeof *t->rims, false);
+    if (t->grids == NULL || t->rims == NULL)
+        return qp_fail_memory(err, t->table.count * sizeof *t->grids, "tessellation grids");
+    grid_job job = {.table = &t->table, .spacing = tess->spacing, .grids = t->grids, .rims = t->rims};
+    qp_parallel(t->table.count, 16, make_grids, &job);
+    return job.failed ? qp_fail(err, job.error.status, "%s", job.error.message) : QP_OK;
+}
+
+static void free_tessellation(tessellation *t) {
+    for (size_t i = 0; t->grids != NULL && i < t->table.count; ++i) qp_tess_grid_free(&t->grids[i]);
+    qp_factors_free(&t->factors);
+    free(t->grids);
+    free(t->rims);
+    free(t->part_grid);
+    free(t->grid_first);
+    free(t->levels);
+    free(t->part_triangle);
+    free(t->table.factors);
+    free(t->table.slots);
+}
+
 qp_status qp_layout_tessellate(const qp_surface *surface, const qp_tessellation *tess, const qp_share *share,
                                bool want_triangles, qp_frame_layout *layout, qp_error *err) {
     *layout = (qp_frame_layout){0};
     tessellation t = {.surface = surface, .share = share};
-    qp_status status = qp_factors_make(surface, tess, &t.factors, err);
-    if (status == QP_OK)
-        status = assign_grids(surface->mesh->n_patches, &t.factors, &t.table, &t.part_grid, err);
-    if (status == QP_OK) {
-        t.grids = qp_alloc(t.table.count, sizeof *t.grids, true);
-        t.rims = qp_alloc(t.table.count, sizeof *t.rims, false);
-        if (t.grids == NULL || t.rims == NULL)
-            status = qp_fail_memory(err, t.table.count * sizeof *t.grids, "tessellation grids");
-    }
-    if (status == QP_OK) {
-        grid_job job = {.table = &t.table, .spacing = tess->spacing, .grids = t.grids, .rims = t.rims};
-        qp_parallel(t.table.count, 16, make_grids, &job);
-        if (job.failed) status = qp_fail(err, job.error.status, "%s", job.error.message);
-    }
+    qp_status status = make_tessellation(&t, tess, err);
     if (status == QP_OK) status = expand(&t, want_triangles, layout, err);
-    for (size_t i = 0; t.grids != NULL && i < t.table.count; ++i) qp_tess_grid_free(&t.grids[i]);
-    qp_factors_free(&t.factors);
-    free(t.grids);
-    free(t.rims);
-    free(t.part_grid);
-    free(t.grid_first);
-    free(t.levels);
-    free(t.part_triangle);
-    free(t.table.factors);
-    free(t.table.slots);
+    free_tessellation(&t);
+    if (status != QP_OK) qp_layout_free(layout);
+    return status;
+}
+
+qp_status qp_layout_items(const qp_surface *surface, const qp_tessellation *tess, qp_frame_layout *layout,
+                          qp_error *err) {
+    *layout = (qp_frame_layout){0};
+    tessellation t = {.surface = surface};
+    qp_status status = make_tessellation(&t, tess, err);
+    if (status == QP_OK) status = list_items(&t, layout, err);
+    free_tessellation(&t);
     if (status != QP_OK) qp_layout_free(layout);
     return status;
 }
