@@ -122,6 +122,15 @@ static qp_status read_text(const reader *r, const json_t *value, const char *pla
     return QP_OK;
 }
 
+static qp_status read_list(const reader *r, const json_t *value, const qp_field *f, const char *place,
+                           uint32_t *out) {
+    char what[100];
+    snprintf(what, sizeof what, "an array of up to %.0f objects", f->high);
+    if (!json_is_array(value) || (double)json_array_size(value) > f->high) return refuse(r, place, what);
+    *out = (uint32_t)json_array_size(value);
+    return QP_OK;
+}
+
 static qp_status read_object(const reader *r, json_t *object, const qp_field *fields, const char *place);
 
 static qp_status read_value(const reader *r, json_t *value, const qp_field *f, const char *place) {
@@ -153,6 +162,8 @@ static qp_status read_value(const reader *r, json_t *value, const qp_field *f, c
         return read_text(r, value, place, out);
     case QP_FIELD_CHOICE:
         return read_choice(r, value, f, place, out);
+    case QP_FIELD_LIST:
+        return read_list(r, value, f, place, out);
     default:
         return read_object(r, value, f->section, place);
     }
@@ -185,6 +196,20 @@ qp_status qp_fields_parse(const char *name, const char *text, size_t length, con
         status = read_object(&r, root, fields, "");
     else
         status = qp_fail(err, QP_BAD_INPUT, "%.200s: a scene is an object { ... }", name);
+    json_decref(root);
+    return status;
+}
+
+qp_status qp_fields_parse_item(const char *name, const char *text, size_t length, const char *key,
+                               uint32_t index, const qp_field *fields, void *target, bool *given,
+                               qp_error *err) {
+    json_error_t trouble;
+    json_t *root = json_loadb(text, length, JSON_REJECT_DUPLICATES, &trouble);
+    if (root == NULL) return qp_fail(err, QP_BAD_INPUT, "%.200s:%d: %s", name, trouble.line, trouble.text);
+    reader r = {name, target, given, err};
+    char place[60];
+    snprintf(place, sizeof place, "%.40s[%u]", key, (unsigned)index);
+    qp_status status = read_object(&r, json_array_get(json_object_get(root, key), index), fields, place);
     json_decref(root);
     return status;
 }

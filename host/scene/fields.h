@@ -16,6 +16,7 @@ typedef enum qp_field_kind {
     QP_FIELD_TEXT,    /* char *, not empty; the struct owns it and starts with NULL */
     QP_FIELD_CHOICE,  /* an enum: index in names */
     QP_FIELD_SECTION, /* an object of its own table */
+    QP_FIELD_LIST, /* uint32_t: how many objects an array holds, up to `high`; qp_fields_parse_item reads them */
 } qp_field_kind;
 
 /* One key; a table ends with a key of NULL. */
@@ -34,5 +35,10 @@ typedef struct qp_field {
  * otherwise. Texts already stored stay in *target on failure. */
 qp_status qp_fields_parse(const char *name, const char *text, size_t length, const qp_field *fields,
                           void *target, bool *given, qp_error *err);
+
+/* Reads object `index` of the list `key` of the same text, which qp_fields_parse has taken. */
+qp_status qp_fields_parse_item(const char *name, const char *text, size_t length, const char *key,
+                               uint32_t index, const qp_field *fields, void *target, bool *given,
+                               qp_error *err);
 
 #endif

@@ -19,6 +19,7 @@ enum {
     GIVEN_TRIANGLES,
     GIVEN_RANDOM,
     GIVEN_FACTOR,
+    GIVEN_TOLERANCE,
     GIVEN_EYE,
     GIVEN_TARGET,
     GIVEN_ANGLE,
@@ -80,8 +81,18 @@ static const qp_field random_fields[] = {
     {0}};
 
 static const qp_field tessellation_fields[] = {
-    {.key = "factor", .kind = QP_FIELD_NUMBER, .offset = AT(factor), .low = 1, .high = 64, .given = GIVEN_FACTOR},
-    {.key = "tolerance", .kind = QP_FIELD_NUMBER, .offset = AT(tolerance), .low = 1e-300, .high = 1e300},
+    {.key = "factor",
+     .kind = QP_FIELD_NUMBER,
+     .offset = AT(factor),
+     .low = 1,
+     .high = 64,
+     .given = GIVEN_FACTOR},
+    {.key = "tolerance",
+     .kind = QP_FIELD_NUMBER,
+     .offset = AT(tolerance),
+     .low = 1e-300,
+     .high = 1e300,
+     .given = GIVEN_TOLERANCE},
     {.key = "spacing", .kind = QP_FIELD_CHOICE, .offset = AT(spacing), .names = spacing_names},
     {.key = "halve_ngons", .kind = QP_FIELD_FLAG, .offset = AT(halve_ngons)},
     {.key = "random", .kind = QP_FIELD_SECTION, .section = random_fields, .given = GIVEN_RANDOM},
@@ -176,6 +187,14 @@ static const qp_field wire_fields[] = {
     {.key = "colour", .kind = QP_FIELD_COLOUR, .offset = AT(wire_colour)},
     {0}};
 
+/* Of a further view. */
+static const qp_field pass_fields[] = {
+    {.key = "name", .kind = QP_FIELD_TEXT, .offset = AT(name)},
+    {.key = "tessellation", .kind = QP_FIELD_SECTION, .section = tessellation_fields},
+    {.key = "camera", .kind = QP_FIELD_SECTION, .section = camera_fields},
+    {.key = "image", .kind = QP_FIELD_SECTION, .section = image_fields},
+    {0}};
+
 static const qp_field scene_fields[] = {
     {.key = "why", .kind = QP_FIELD_TEXT, .offset = AT(why)},
     {.key = "mesh", .kind = QP_FIELD_SECTION, .section = mesh_fields, .given = GIVEN_MESH},
@@ -189,6 +208,7 @@ static const qp_field scene_fields[] = {
     {.key = "image", .kind = QP_FIELD_SECTION, .section = image_fields},
     {.key = "colour_by", .kind = QP_FIELD_CHOICE, .offset = AT(colour_by), .names = colour_names},
     {.key = "wireframe", .kind = QP_FIELD_SECTION, .section = wire_fields, .given = GIVEN_WIRE},
+    {.key = "passes", .kind = QP_FIELD_LIST, .offset = AT(n_passes), .high = QP_PASSES_MAX},
     {0}};
 
 static const draft defaults = {.scene = {.generate = {.sharpness = -1},
@@ -246,13 +266,12 @@ qp_status qp_colour_from_name(const char *name, qp_colour *colour, qp_error *err
                    name);
 }
 
-/* What the tables cannot express. */
-static qp_status check_whole(const char *name, draft *d, qp_error *err) {
+/* ---- What the tables cannot express ---- */
+
+/* Where a view is seen from, and its tessellation. A pass keeps of the scene's what it does not give. */
+static qp_status check_view(const char *name, draft *d, qp_error *err) {
     qp_scene *s = &d->scene;
     const bool *given = d->given;
-    if (s->why == NULL) return qp_fail(err, QP_BAD_INPUT, "%s: no \"why\"", name);
-    if (given[GIVEN_FILE] == given[GIVEN_GENERATE])
-        return qp_fail(err, QP_BAD_INPUT, "%s: mesh needs either \"file\" or \"generate\"", name);
     if (given[GIVEN_EYE] != given[GIVEN_TARGET])
         return qp_fail(err, QP_BAD_INPUT, "%s: camera needs both \"eye\" and \"target\"", name);
     if (given[GIVEN_EYE] && given[GIVEN_ANGLE])
@@ -261,16 +280,14 @@ static qp_status check_whole(const char *name, draft *d, qp_error *err) {
                        name);
     if (s->factor_min > s->factor_max)
         return qp_fail(err, QP_BAD_INPUT, "%s: tessellation.random.min is above max", name);
-    s->fit = !given[GIVEN_EYE];
-    s->random_factors = given[GIVEN_RANDOM];
-    if (s->tolerance != 0 && s->random_factors)
+    if (given[GIVEN_EYE] || given[GIVEN_ANGLE]) s->fit = !given[GIVEN_EYE];
+    if (given[GIVEN_TOLERANCE] && given[GIVEN_RANDOM])
         return qp_fail(err, QP_BAD_INPUT, "%s: tessellation has both \"random\" and \"tolerance\"", name);
-    if (s->tolerance != 0 && !given[GIVEN_FACTOR]) s->factor = 64;
-    s->ground = given[GIVEN_GROUND];
-    if (given[GIVEN_WIRE] && !(s->wire_width > 0)) s->wire_width = 1;
-    s->mesh_options.override_boundary = given[GIVEN_BOUNDARY];
-    s->mesh_options.override_crease_method = given[GIVEN_CREASE];
-    s->mesh_options.override_triangle_rule = given[GIVEN_TRIANGLES];
+    if (given[GIVEN_FACTOR] || given[GIVEN_RANDOM] || given[GIVEN_TOLERANCE]) {
+        s->random_factors = given[GIVEN_RANDOM];
+        if (!given[GIVEN_TOLERANCE]) s->tolerance = 0;
+    }
+    if (given[GIVEN_TOLERANCE] && !given[GIVEN_FACTOR]) s->factor = 64;
 
     double toward[3] = {0, 0, -1}, across[3];
     if (!s->fit)
@@ -282,6 +299,50 @@ static qp_status check_whole(const char *name, draft *d, qp_error *err) {
     if (s->fit ? !(hypot(hypot(s->up[0], s->up[1]), s->up[2]) > 0) : !(sine > 1e-6 * scale))
         return qp_fail(err, QP_BAD_INPUT, "%s: camera looks nowhere (eye at the target, or along \"up\")",
                        name);
+    return QP_OK;
+}
+
+static qp_status check_whole(const char *name, draft *d, qp_error *err) {
+    qp_scene *s = &d->scene;
+    const bool *given = d->given;
+    if (s->why == NULL) return qp_fail(err, QP_BAD_INPUT, "%s: no \"why\"", name);
+    if (given[GIVEN_FILE] == given[GIVEN_GENERATE])
+        return qp_fail(err, QP_BAD_INPUT, "%s: mesh needs either \"file\" or \"generate\"", name);
+    s->ground = given[GIVEN_GROUND];
+    if (given[GIVEN_WIRE] && !(s->wire_width > 0)) s->wire_width = 1;
+    s->mesh_options.override_boundary = given[GIVEN_BOUNDARY];
+    s->mesh_options.override_crease_method = given[GIVEN_CREASE];
+    s->mesh_options.override_triangle_rule = given[GIVEN_TRIANGLES];
+    return check_view(name, d, err);
+}
+
+/* The passes of a scene that is otherwise complete. */
+static qp_status read_passes(const char *name, const char *text, size_t length, qp_scene *scene,
+                             qp_error *err) {
+    const uint32_t count = scene->n_passes;
+    scene->n_passes = 0;
+    if (count == 0) return QP_OK;
+    scene->passes = qp_alloc(count, sizeof *scene->passes, false);
+    if (scene->passes == NULL)
+        return qp_fail_memory(err, count * sizeof *scene->passes, "the passes of a scene");
+    for (uint32_t i = 0; i < count; ++i) {
+        draft d = {.scene = *scene};
+        char place[240], number[24];
+        d.scene.n_passes = 0;
+        d.scene.passes = NULL;
+        snprintf(place, sizeof place, "%.200s: passes[%u]", name, (unsigned)i);
+        snprintf(number, sizeof number, "%u", (unsigned)i + 2u);
+        qp_status status =
+            qp_fields_parse_item(name, text, length, "passes", i, pass_fields, &d, d.given, err);
+        if (status == QP_OK) status = check_view(place, &d, err);
+        if (status == QP_OK && d.scene.name == NULL && (d.scene.name = strdup(number)) == NULL)
+            status = qp_fail_memory(err, sizeof number, "a text");
+        if (status != QP_OK) {
+            free(d.scene.name);
+            return status;
+        }
+        scene->passes[scene->n_passes++] = d.scene;
+    }
     return QP_OK;
 }
 
@@ -298,6 +359,15 @@ static qp_status resolve_mesh_path(const char *name, qp_scene *scene, qp_error *
     return QP_OK;
 }
 
+static void free_parts(qp_scene *scene) {
+    for (uint32_t i = 0; scene->passes != NULL && i < scene->n_passes; ++i) free(scene->passes[i].name);
+    free(scene->passes);
+    free(scene->path);
+    free(scene->why);
+    free(scene->mesh_path);
+    free(scene->generate_kind);
+}
+
 qp_status qp_scene_parse(const char *name, const char *text, size_t length, qp_scene **out, qp_error *err) {
     *out = NULL;
     draft *d = qp_alloc(1, sizeof *d, false);
@@ -312,15 +382,13 @@ qp_status qp_scene_parse(const char *name, const char *text, size_t length, qp_s
         if (d->scene.path == NULL || *out == NULL)
             status = qp_fail_memory(err, sizeof **out + strlen(name), "a scene");
     }
+    if (status == QP_OK) status = read_passes(name, text, length, &d->scene, err);
     if (status == QP_OK) {
         **out = d->scene;
     } else {
         free(*out);
         *out = NULL;
-        free(d->scene.path);
-        free(d->scene.why);
-        free(d->scene.mesh_path);
-        free(d->scene.generate_kind);
+        free_parts(&d->scene);
     }
     free(d);
     return status;
@@ -352,9 +420,6 @@ qp_status qp_scene_read(const char *path, qp_scene **scene, qp_error *err) {
 
 void qp_scene_free(qp_scene *scene) {
     if (scene == NULL) return;
-    free(scene->path);
-    free(scene->why);
-    free(scene->mesh_path);
-    free(scene->generate_kind);
+    free_parts(scene);
     free(scene);
 }

@@ -41,7 +41,7 @@ typedef struct qp_scene {
 
     qp_spacing spacing;
     double factor;
-    double tolerance; /* 0: none; else factors are chosen, up to .factor */
+    double tolerance;    /* 0: none; else factors are chosen, up to .factor */
     bool halve_ngons;    /* children of n-gons get half the factor, so that edges shared with quads match */
     bool random_factors; /* every edge and inside draws its own integer factor from [min, max] */
     uint64_t factor_seed;
@@ -69,7 +69,15 @@ typedef struct qp_scene {
     qp_colour colour_by;
     double wire_width; /* pixels; 0: no tessellation wireframe */
     double wire_colour[3];
+
+    /* Further views of the same geometry: each is this scene with a tessellation, a camera and a picture of its own, and a name. Its
+     * other texts are this scene's, and it has no passes itself. */
+    uint32_t n_passes;
+    struct qp_scene *passes; /* [n_passes] */
+    char *name;              /* of a pass; NULL: of the scene itself */
 } qp_scene;
+
+enum { QP_PASSES_MAX = 64 };
 
 /* Reads and checks a scene file. QP_BAD_INPUT with "FILE: reason" or "FILE:LINE: reason"; unknown keys are
  * refused by name. The mesh is not read yet. */

@@ -37,6 +37,11 @@ static void check_scene(const qp_scene *s) {
     demand(qp_colour_name(s->colour_by) != NULL, "colour mode");
     demand(s->palette_count >= 1 && s->palette_count <= QP_PALETTE_MAX, "palette");
     demand(within(s->wire_width, 0, 20) && s->shadow_samples <= 256, "lines and lights");
+    demand(s->n_passes <= QP_PASSES_MAX && (s->n_passes == 0 || s->passes != NULL), "passes");
+    for (uint32_t i = 0; i < s->n_passes; ++i) {
+        demand(s->passes[i].name != NULL && s->passes[i].n_passes == 0, "a pass");
+        check_scene(&s->passes[i]);
+    }
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size) {

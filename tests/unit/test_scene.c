@@ -62,6 +62,14 @@ static void refuses(void) {
         {"{\"why\": \"w\", \"mesh\": {\"generate\": \"cube\"}, \"tessellation\": {\"random\": {\"min\": 9, "
          "\"max\": 3}}}",
          "min is above max"},
+        {"{\"why\": \"w\", \"mesh\": {\"generate\": \"cube\"}, \"passes\": {}}", "passes must be an array"},
+        {"{\"why\": \"w\", \"mesh\": {\"generate\": \"cube\"}, \"passes\": [1]}",
+         "passes[0] must be an object"},
+        {"{\"why\": \"w\", \"mesh\": {\"generate\": \"cube\"}, \"passes\": [{}, {\"mesh\": {}}]}",
+         "unknown key passes[1].mesh"},
+        {"{\"why\": \"w\", \"mesh\": {\"generate\": \"cube\"}, \"passes\": [{\"camera\": {\"eye\": "
+         "[0,0,1]}}]}",
+         "passes[0]: camera needs both"},
     };
     for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++) {
         qp_scene *s;
@@ -74,6 +82,30 @@ static void refuses(void) {
     qp_error err;
     CHECK(qp_scene_read("/nonexistent/s.json", &s, &err) == QP_BAD_INPUT);
     CHECK(qp_scene_read("/", &s, &err) == QP_BAD_INPUT);
+}
+
+static void reads_passes(void) {
+    qp_scene *s;
+    qp_error err;
+    const char *text = "{\"passes\": [{\"name\": \"shadow\", \"tessellation\": {\"factor\": 4}, \"camera\": "
+                       "{\"eye\": [1, 2, 3],"
+                       " \"target\": [0, 0, 0]}}, {\"camera\": {\"azimuth\": 90}, \"image\": {\"width\": "
+                       "7}}], \"why\": \"w\","
+                       " \"mesh\": {\"generate\": \"cube\"}, \"tessellation\": {\"tolerance\": 0.5, "
+                       "\"spacing\": \"fractional_even\"},"
+                       " \"camera\": {\"azimuth\": 5, \"elevation\": 6, \"fov\": 50}}";
+    if (!CHECK_OK(parse(text, &s, &err), err)) return;
+    if (CHECK(s->n_passes == 2 && s->name == NULL)) {
+        const qp_scene *first = &s->passes[0], *second = &s->passes[1];
+        CHECK(strcmp(first->name, "shadow") == 0 && strcmp(second->name, "3") == 0);
+        CHECK(first->factor == 4 && first->tolerance == 0 && first->spacing == QP_FRACTIONAL_EVEN);
+        CHECK(!first->fit && first->eye[2] == 3 && first->fov == 50 && first->n_passes == 0);
+        CHECK(second->tolerance == 0.5 && second->factor == 64 && second->fit);
+        CHECK(second->azimuth == 90 && second->elevation == 6 && second->width == 7 &&
+              second->height == s->height);
+        CHECK(second->why == s->why);
+    }
+    qp_scene_free(s);
 }
 
 static void tolerances(void) {
@@ -149,6 +181,7 @@ static void factors_match(qp_spacing spacing, bool random) {
 int main(void) {
     tolerances();
     reads_values();
+    reads_passes();
     refuses();
     factors_match(QP_EQUAL, false);
     factors_match(QP_EQUAL, true);
