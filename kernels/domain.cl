@@ -369,14 +369,14 @@ QP_FUNCTION void QP_NAME(domain_patch)(__global const uint *heads, __global cons
     __global const real *vs = grid_v + QP_ENTRY_WIDE(entry, QP_ENTRY_GRID);
     __global const real *first = positions + QP_POSITION_FIRST;
     __global const uint *ring = rings + QP_ENTRY_WIDE(entry, QP_ENTRY_RING);
-    __global const real *base = first + 3u * (ulong)ring[0];
+    __global const real *base = first + 3u * (ulong)entry[QP_ENTRY_ORIGIN];
     const real4 origin = make4(base[0], base[1], base[2]);
     const ulong out = QP_ENTRY_WIDE(entry, QP_ENTRY_OUT);
     const uint rotation = entry[QP_ENTRY_ROTATION];
     const uint samples = entry[QP_ENTRY_SAMPLES], level = entry[QP_ENTRY_LEVEL];
 
     real size = QP_R(0.0);
-    for (uint j = 1; j < head[QP_HEAD_RING]; ++j) {
+    for (uint j = 0; j < head[QP_HEAD_RING]; ++j) {
         __global const real *p = first + 3u * (ulong)ring[j];
         const real most = QP_NAME(largest)(make4(p[0] - origin.x, p[1] - origin.y, p[2] - origin.z));
         size = most > size ? most : size;

@@ -7,14 +7,22 @@
 #define QP_ENTRY_ROTATION 1u /* 0..3, see plan_layout.h */
 #define QP_ENTRY_ROWS 2u     /* points to make: rows[level] of the plan */
 #define QP_ENTRY_SAMPLES 3u  /* samples of this entry */
-#define QP_ENTRY_RING 4u     /* 64 bits: first entry in rings */
+#define QP_ENTRY_RING 4u     /* 64 bits: first word in rings, see below */
 #define QP_ENTRY_SUPPORT 6u  /* 64 bits: first point in the support buffer */
 #define QP_ENTRY_GRID 8u     /* 64 bits: first (u,v) in the grid */
 #define QP_ENTRY_OUT 10u     /* 64 bits: first sample in the vertex buffer */
 #define QP_ENTRY_LEVEL 12u   /* the level of the tessellation, whose points are made: rows[level] */
+#define QP_ENTRY_ORIGIN 13u  /* base vertex that the patch is relative to */
 #define QP_ENTRY_WORDS 16u   /* a cache line */
 
 #define QP_ENTRY_WIDE(e, word) ((ulong)(e)[word] | (ulong)(e)[(word) + 1u] << 32)
+
+/* A patch whose plan has a ring of N vertices has 2 N + 4 words in rings: the N vertices in the plan's order; their places 0..N-1 in that
+ * order, sorted as the hull adds them up (host/frame/rings.c), with QP_RING_PART set where a partial sum begins; and the vertices that
+ * are the anchors of the plan's corners 0..3. */
+#define QP_RING_WORDS(n) (2u * (n) + 4u)
+#define QP_RING_PART 0x80000000u
+#define QP_RING_PLACE(word) ((word)&0x7fffffffu)
 
 /* Bits of a sample's flags, as QP_SAMPLE_* of quadplan.h. */
 #define QP_FLAG_PAST_DEPTH 1u

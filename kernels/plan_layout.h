@@ -11,8 +11,11 @@
  * reals[j * P + i], so that neighbouring work-items (points) read neighbouring weights. Points are sorted by
  * the first level that needs them: a frame at level n computes points [0, rows[n]).
  *
- * Everything is relative to the patch origin, the position of ring vertex 0: the hull subtracts it from every
- * ring position first (exact or correctly rounded once), the domain stage adds it last. Weights of a row sum
+ * Everything is relative to the patch origin, a base vertex at (or, in an n-gon, near) the corner QP_HEAD_BASE: the domain stage adds
+ * it last. A point is computed relative to its anchor, which may be another corner's vertex: the hull subtracts the anchor from every
+ * ring position first (exact or correctly rounded once), and moves points with QP_ANCHOR_MOVES, which are positions, to the
+ * origin afterwards (host/plan/anchor.c). With QP_PLAN_ANCHORS set, 4 bits a point, eight points a word, low bits first, hold the
+ * corner 0..3 and that flag. Weights of a row sum
  * to 1, or to 0 for tangents and for *offset* rows: the points of a terminal node are stored as offsets from
  * the limit position of its corner (point ORIGIN), those of its ring number k times 2^k, so that they keep full
  * relative precision however deep they lie.
@@ -32,7 +35,9 @@
 #define QP_HEAD_REALS 3u  /* first element in reals */
 #define QP_HEAD_FLAGS 4u  /* QP_PLAN_* */
 #define QP_HEAD_ROWS 5u   /* rows[QP_LEVELS] */
-#define QP_HEAD_WORDS (QP_HEAD_ROWS + QP_LEVELS)
+#define QP_HEAD_ANCHORS (QP_HEAD_ROWS + QP_LEVELS) /* with QP_PLAN_ANCHORS: first word of the anchors, relative to QP_HEAD_TREE */
+#define QP_HEAD_BASE (QP_HEAD_ANCHORS + 1u)        /* corner of the plan that is the patch's origin */
+#define QP_HEAD_WORDS (QP_HEAD_BASE + 1u)
 
 #define QP_PLAN_REGULAR 1u  /* the one plan whose points are its 16 ring vertices, row-major from (-1,-1) */
 #define QP_PLAN_CREASE 2u   /* has crease nodes */
@@ -40,6 +45,7 @@
 #define QP_PLAN_INTERNAL 8u /* has internal nodes */
 #define QP_PLAN_CORNERS 16u /* has extraordinary or irregular leaves */
 #define QP_PLAN_IRREGULAR 32u /* has irregular leaves */
+#define QP_PLAN_ANCHORS 128u /* has points whose anchor is not the base */
 #define QP_PLAN_MODES 64u /* has points with shares in modes: behind the weights come P reals, the points' fourth numbers */
 
 /* Word 0 of a node: kind in bits 0..2, rotation in bits 3..4 (crease, terminal, extraordinary), tie_u in bit 5,
@@ -88,6 +94,9 @@
 #define QP_NODE_ABSOLUTE_RINGS(w) (((w) >> 16) & 255u)
 #define QP_NODE_EXACT (1u << 8) /* extraordinary */
 #define QP_NODE_MODE (1u << 24) /* terminal */
+
+#define QP_ANCHOR_CORNER(a) ((a)&3u)
+#define QP_ANCHOR_MOVES 4u
 
 #define QP_NO_POINT 0xffffu
 #define QP_CREASE_REALS 53u

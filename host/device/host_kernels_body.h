@@ -28,8 +28,8 @@
 /* Unpacks the arguments. */
 #define QP_HOST_THUNKS(suffix)                                                                               \
     static void run_hull_##suffix(const qp_host_arg *a, size_t group) {                                      \
-        hull_##suffix(a[0].memory, a[1].memory, a[2].memory, a[3].memory, a[4].memory, a[5].number,          \
-                      a[6].memory, group);                                                                   \
+        hull_##suffix(a[0].memory, a[1].memory, a[2].memory, a[3].memory, a[4].memory, a[5].memory,          \
+                      a[6].number, a[7].memory, group);                                                                   \
     }                                                                                                        \
     static void run_domain_##suffix(const qp_host_arg *a, size_t group) {                                    \
         domain_##suffix(a[0].memory, a[1].memory, a[2].memory, a[3].memory, a[4].memory, a[5].memory,        \

@@ -25,6 +25,7 @@ static void write_entry(const qp_frame *frame, const qp_frame_item *item, const 
     entry[QP_ENTRY_ROWS] = item_rows(frame, item);
     entry[QP_ENTRY_SAMPLES] = item->samples;
     entry[QP_ENTRY_LEVEL] = item->level;
+    entry[QP_ENTRY_ORIGIN] = qp_frame_origin(plan.surface, item->patch);
     put_wide(entry + QP_ENTRY_RING, plan.ring);
     put_wide(entry + QP_ENTRY_SUPPORT, support);
     put_wide(entry + QP_ENTRY_GRID, item->grid);

@@ -98,9 +98,9 @@ static qp_status launch_batches(qp_frame *frame, double *hull_ms, double *domain
         if (status == QP_OK) status = qp_buffer_unmap(frame->device, &batch->derivatives, err);
         /* Any buffer will do where none is written. */
         const qp_buffer *derivatives = want != 0 ? &batch->derivatives : &batch->vertices;
-        const qp_arg hull[] = {{&frame->heads, 0},     {&frame->reals, 0},   {&frame->rings, 0},
-                               {&frame->positions, 0}, {&frame->entries, 0}, {NULL, batch->first_general},
-                               {&frame->support, 0}};
+        const qp_arg hull[] = {{&frame->heads, 0},   {&frame->trees, 0},     {&frame->reals, 0},
+                               {&frame->rings, 0},   {&frame->positions, 0}, {&frame->entries, 0},
+                               {NULL, batch->first_general}, {&frame->support, 0}};
         const qp_arg domain[] = {
             {&frame->heads, 0},     {&frame->trees, 0},   {&frame->reals, 0},           {&frame->rings, 0},
             {&frame->positions, 0}, {&frame->entries, 0}, {NULL, batch->first_general}, {&frame->support, 0},

@@ -35,7 +35,8 @@ qp_frame_plan qp_frame_plan_of(const qp_frame *frame, uint32_t patch) {
     return (qp_frame_plan){.plan = surface->plans[plan],
                            .index = frame->first_plan[step] + plan,
                            .rotation = surface->patch_rotation[patch],
-                           .ring = frame->first_ring[step] + surface->patch_ring[patch]};
+                           .ring = frame->first_ring[step] + qp_frame_ring_word(surface, patch),
+                           .surface = surface};
 }
 
 /* ---- what the samples need ---- */
@@ -186,25 +187,6 @@ static qp_status build_kernels(qp_frame *frame, qp_error *err) {
     return status;
 }
 
-static qp_status upload_rings(qp_frame *frame, const qp_surface *const *surfaces, uint32_t n_surfaces,
-                              qp_error *err) {
-    uint64_t entries = 0, at = 0;
-    for (uint32_t s = 0; s < n_surfaces; ++s) entries += surfaces[s]->ring_entries;
-    if (n_surfaces == 1)
-        return qp_frame_upload(frame, &frame->rings, surfaces[0]->rings, (size_t)entries * sizeof(uint32_t),
-                               "1-rings", err);
-    uint32_t *rings = qp_alloc((size_t)entries, sizeof *rings, false);
-    if (rings == NULL) return qp_fail_memory(err, (size_t)entries * sizeof *rings, "1-rings");
-    for (uint32_t s = 0; s < n_surfaces; at += surfaces[s++]->ring_entries) {
-        if (surfaces[s]->ring_entries != 0)
-            memcpy(rings + at, surfaces[s]->rings, (size_t)surfaces[s]->ring_entries * sizeof *rings);
-    }
-    qp_status status =
-        qp_frame_upload(frame, &frame->rings, rings, (size_t)entries * sizeof *rings, "1-rings", err);
-    free(rings);
-    return status;
-}
-
 qp_status qp_frame_upload_plans(qp_frame *frame, qp_error *err) {
     const qp_surface *surfaces[1 + QP_PLAN_STEPS];
     uint32_t n_surfaces = 0, n_plans = 0;
@@ -216,7 +198,7 @@ qp_status qp_frame_upload_plans(qp_frame *frame, qp_error *err) {
         frame->first_plan[step] = n_plans;
         frame->first_ring[step] = entries;
         n_plans += surface->n_plans;
-        entries += surface->ring_entries;
+        entries += qp_frame_ring_words(surface);
     }
     frame->n_plans = n_plans;
     frame->plans_uploaded = false;
@@ -241,7 +223,7 @@ qp_status qp_frame_upload_plans(qp_frame *frame, qp_error *err) {
             free(padded);
         }
     }
-    if (status == QP_OK) status = upload_rings(frame, surfaces, n_surfaces, err);
+    if (status == QP_OK) status = qp_frame_upload_rings(frame, surfaces, n_surfaces, err);
     frame->plans_uploaded = status == QP_OK;
     free(pack.heads);
     free(pack.tree);

@@ -28,6 +28,7 @@ void qp_plan_free(qp_plan *plan) {
     free(plan->point_kinds);
     free(plan->point_origins);
     free(plan->point_scales);
+    free(plan->point_anchors);
     free(plan->point_modes);
     free(plan->point_shares);
     free(plan);

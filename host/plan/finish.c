@@ -67,12 +67,13 @@ qp_plan *qp_plan_finish(qp_builder *b) {
         plan->point_kinds = qp_alloc(count, 1, false);
         plan->point_origins = qp_alloc(count, sizeof *plan->point_origins, false);
         plan->point_scales = qp_alloc(count, 1, false);
+        plan->point_anchors = qp_alloc(count, 1, false);
         plan->point_modes = qp_alloc(count, sizeof *plan->point_modes, false);
         plan->point_shares = qp_alloc(count, sizeof *plan->point_shares, false);
     }
     if (plan == NULL || index == NULL || plan->tree == NULL || plan->weights == NULL ||
         plan->constants == NULL || plan->point_kinds == NULL || plan->point_origins == NULL ||
-        plan->point_scales == NULL || plan->point_modes == NULL || plan->point_shares == NULL) {
+        plan->point_scales == NULL || plan->point_anchors == NULL || plan->point_modes == NULL || plan->point_shares == NULL) {
         free(index);
         qp_plan_free(plan);
         b->failed = true;
@@ -103,6 +104,7 @@ qp_plan *qp_plan_finish(qp_builder *b) {
     }
     plan->rows[QP_LEVELS - 1] = count;
     renumber_tree(plan, index);
+    qp_plan_anchor(plan);
     free(index);
     return plan;
 }

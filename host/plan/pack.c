@@ -37,12 +37,23 @@ static void pack_reals(const qp_plan *plan, qp_precision precision, void *reals,
         put_real(precision, reals, at + c, plan->constants[c]);
 }
 
+static void pack_tree(const qp_plan *plan, uint32_t *words) {
+    memcpy(words, plan->tree, plan->tree_words * sizeof *plan->tree);
+    words += plan->tree_words;
+    const uint32_t count = qp_plan_anchor_words(plan);
+    for (uint32_t k = 0; k < count; ++k) words[k] = 0;
+    for (uint32_t i = 0; count != 0 && i < plan->point_count; ++i)
+        words[i / 8] |= (uint32_t)plan->point_anchors[i] << (i % 8 * 4);
+}
+
 static void pack_head(const qp_plan *plan, size_t tree, size_t reals, uint32_t *head) {
     head[QP_HEAD_RING] = plan->ring_size;
     head[QP_HEAD_POINTS] = plan->point_count;
     head[QP_HEAD_TREE] = (uint32_t)tree;
     head[QP_HEAD_REALS] = (uint32_t)reals;
     head[QP_HEAD_FLAGS] = plan->flags;
+    head[QP_HEAD_ANCHORS] = plan->tree_words;
+    head[QP_HEAD_BASE] = plan->base;
     memcpy(head + QP_HEAD_ROWS, plan->rows, sizeof plan->rows);
 }
 
@@ -54,7 +65,7 @@ qp_status qp_surface_pack(const qp_surface *const *surfaces, uint32_t n_surfaces
         pack->head_words += (size_t)surfaces[s]->n_plans * QP_HEAD_WORDS;
         for (uint32_t p = 0; p < surfaces[s]->n_plans; ++p) {
             const qp_plan *plan = surfaces[s]->plans[p];
-            pack->tree_words += plan->tree_words;
+            pack->tree_words += plan->tree_words + qp_plan_anchor_words(plan);
             if (plan->ring_size > widest) widest = plan->ring_size;
             pack->real_count += (size_t)qp_plan_first_constant(plan) + plan->constant_count;
         }
@@ -83,9 +94,9 @@ qp_status qp_surface_pack(const qp_surface *const *surfaces, uint32_t n_surfaces
         for (uint32_t p = 0; p < surfaces[s]->n_plans; ++p, head += QP_HEAD_WORDS) {
             const qp_plan *plan = surfaces[s]->plans[p];
             pack_head(plan, tree, reals, head);
-            memcpy(pack->tree + tree, plan->tree, plan->tree_words * sizeof *plan->tree);
+            pack_tree(plan, pack->tree + tree);
             pack_reals(plan, precision, pack->reals, reals, rest);
-            tree += plan->tree_words;
+            tree += plan->tree_words + qp_plan_anchor_words(plan);
             reals += (size_t)qp_plan_first_constant(plan) + plan->constant_count;
         }
     }

@@ -18,9 +18,16 @@ typedef struct qp_plan {
     uint16_t *
         point_modes; /* [point_count] NULL, or the point of which a row holds point_shares[i] (mode.c), or QP_NO_POINT */
     double *point_shares;
+    uint8_t *point_anchors; /* [point_count] corner 0..3 of the plan that a point is computed relative to, and QP_ANCHOR_MOVES (anchor.c) */
+    uint8_t base;           /* the corner that positions are relative to in the end */
     double *constants; /* [constant_count]; nodes hold index + qp_plan_first_constant() */
     uint32_t depth;    /* deepest level stored; less than asked for where that took too many points */
 } qp_plan;
+
+/* Words of anchors behind a plan's tree on a device: 4 bits a point, 0 where the base is all there is. */
+static inline uint32_t qp_plan_anchor_words(const qp_plan *plan) {
+    return (plan->flags & QP_PLAN_ANCHORS) != 0 ? (plan->point_count + 7u) / 8u : 0u;
+}
 
 /* Where constants begin in a plan's reals. */
 static inline uint32_t qp_plan_first_constant(const qp_plan *plan) {

@@ -205,8 +205,9 @@ static qp_plan *regular_plan(void) {
     plan->point_kinds = qp_alloc(16, 1, true);
     plan->point_origins = qp_alloc(16, sizeof *plan->point_origins, false);
     plan->point_scales = qp_alloc(16, 1, true);
+    plan->point_anchors = qp_alloc(16, 1, true);
     if (plan->tree == NULL || plan->weights == NULL || plan->constants == NULL || plan->point_kinds == NULL ||
-        plan->point_origins == NULL || plan->point_scales == NULL) {
+        plan->point_origins == NULL || plan->point_scales == NULL || plan->point_anchors == NULL) {
         qp_plan_free(plan);
         return NULL;
     }
