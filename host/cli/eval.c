@@ -62,6 +62,7 @@ static void print_result(bool as_json, const char *name, const cli_evaluation *e
         printf("  %.2f million samples a second, %.4f of the speed of memset\n", rate * 1e-6, ratio);
         printf("  control points %" PRIu64 " bytes, stream hash %016" PRIx64 "\n", t->peak_support_bytes,
                s->hash);
+        cli_supports_text(&options->supports, &s->supports);
         cli_tolerance_text(options->tolerance, s);
         return;
     }
@@ -85,6 +86,7 @@ static void print_result(bool as_json, const char *name, const cli_evaluation *e
     qp_json_real(&json, "samples_per_second", rate);
     qp_json_real(&json, "memset_ratio", ratio);
     qp_json_integer(&json, "peak_support_bytes", t->peak_support_bytes);
+    cli_supports_json(&json, &options->supports, &s->supports);
     qp_json_text(&json, "stream_hash", hash);
     qp_json_text(&json, "device", qp_device_name(evaluation->device));
     qp_json_finish(&json);
@@ -101,6 +103,8 @@ static qp_status run(int argc, char **argv, qp_error *err) {
          1, MOST_REPEATS, NULL},
         {"-o", "FILE", "write the vertex stream: .obj, .ply (binary) or .npy (n x 6)", CLI_TEXT, &path, 0, 0,
          NULL},
+        {"--trace", "FILE", "write each patch's way through the ring, for chrome://tracing", CLI_TEXT,
+         &o.supports.trace, 0, 0, NULL},
         {"--json", NULL, "print one JSON object", CLI_FLAG, &json, 0, 0, NULL},
         {0},
     };
@@ -120,6 +124,8 @@ static qp_status run(int argc, char **argv, qp_error *err) {
     if (status == QP_OK) status = measure(&evaluation, &tessellation, repeats, t, &stream, err);
     if (status == QP_OK) cli_tolerance_warn(o.tolerance, &stream);
     if (status == QP_OK && path != NULL) status = cli_stream_write(&stream, path, err);
+    if (status == QP_OK && o.supports.trace != NULL)
+        status = cli_trace_write(&o.supports, &stream, o.supports.trace, err);
     if (status == QP_OK) print_result(json, arguments.values[0], &evaluation, &o, t, &stream);
     free(t);
     cli_evaluation_close(&evaluation);

@@ -16,7 +16,8 @@ qp_status cli_evaluation_open(const char *argument, const cli_evaluation_options
         .no_exact_tail = options->no_exact_tail,
         .tolerance = options->tolerance,
     };
-    qp_status status = cli_mesh_open(argument, &options->mesh, &evaluation->mesh, err);
+    qp_status status = cli_supports_get(&options->supports, &frame_options.supports, err);
+    if (status == QP_OK) status = cli_mesh_open(argument, &options->mesh, &evaluation->mesh, err);
     if (status == QP_OK)
         status = qp_surface_create(evaluation->mesh, &surface_options, &evaluation->surface, err);
     if (status == QP_OK) status = qp_device_open(options->device, &evaluation->device, err);

@@ -2,7 +2,7 @@
 #ifndef QP_CLI_EVALUATION_H
 #define QP_CLI_EVALUATION_H
 
-#include "host/cli/cli.h"
+#include "host/cli/supports.h"
 
 typedef struct cli_evaluation_options {
     cli_mesh_options mesh;
@@ -13,10 +13,11 @@ typedef struct cli_evaluation_options {
     const char *device;     /* NULL: the library's default */
     bool no_regular_pass, no_sharing, no_exact_tail;
     bool derivatives; /* set by the subcommand */
+    cli_supports_options supports;
 } cli_evaluation_options;
 
 #define CLI_EVALUATION_DEFAULTS                                                                              \
-    { .tess = 16 }
+    { .tess = 16, .supports = CLI_SUPPORTS_DEFAULTS }
 /* clang-format off */
 #define CLI_EVALUATION_OPTIONS(o)                                                                            \
     {"--tess", "F", "uniform tessellation factor, 1 to 64 (default 16)",                                     \
@@ -40,6 +41,7 @@ typedef struct cli_evaluation_options {
      CLI_FLAG, &(o).no_sharing, 0, 0, NULL},                                                                 \
     {"--no-regular-pass", NULL, "evaluate regular patches by the general kernels, for comparison",           \
      CLI_FLAG, &(o).no_regular_pass, 0, 0, NULL},                                                            \
+    CLI_SUPPORTS_OPTIONS((o).supports),                                                                      \
     CLI_MESH_OPTIONS((o).mesh)
 /* clang-format on */
 

@@ -1,6 +1,6 @@
 /* quadplan render: a scene to a picture. */
 #include "gl/render_stream.h"
-#include "host/cli/cli.h"
+#include "host/cli/supports.h"
 
 #include <inttypes.h>
 #include <stdlib.h>
@@ -15,6 +15,7 @@ typedef struct overrides {
     uint64_t depth;
     cli_sizes size;
     const char *device;
+    cli_supports_options supports;
 } overrides;
 
 static qp_status apply(const overrides *o, qp_scene *scene, qp_error *err) {
@@ -67,7 +68,8 @@ static qp_status draw(const char *path, const overrides *o, work *w, qp_error *e
     qp_frame_options frame_options = {
         .precision = (qp_precision)o->precision, .want_triangles = 1, .want_hash = 1};
     qp_tessellation tessellation;
-    qp_status status = qp_scene_read(path, &w->scene, err);
+    qp_status status = cli_supports_get(&o->supports, &frame_options.supports, err);
+    if (status == QP_OK) status = qp_scene_read(path, &w->scene, err);
     if (status == QP_OK) status = apply(o, w->scene, err);
     if (status == QP_OK) status = qp_scene_mesh(w->scene, cli_print_warning, NULL, &w->mesh, err);
     if (status == QP_OK) status = qp_surface_create(w->mesh, &w->scene->surface_options, &w->surface, err);
@@ -80,13 +82,15 @@ static qp_status draw(const char *path, const overrides *o, work *w, qp_error *e
     return status;
 }
 
-static void print_result(bool as_json, const char *scene, const char *picture, const work *w) {
+static void print_result(bool as_json, const char *scene, const char *picture, const overrides *o,
+                         const work *w) {
     const qp_stream *s = &w->stream;
     if (!as_json) {
         printf("%s: %" PRIu32 "x%" PRIu32 ", %" PRIu64 " samples, %" PRIu64 " triangles\n", picture,
                w->image.width, w->image.height, s->n_samples, s->n_triangles);
         printf("  evaluated on %s in %.2f ms, drawn by %s\n", qp_device_name(w->device), s->frame_ms,
                w->backend);
+        cli_supports_text(&o->supports, &s->supports);
         cli_tolerance_text(w->scene->tolerance, s);
         return;
     }
@@ -103,6 +107,7 @@ static void print_result(bool as_json, const char *scene, const char *picture, c
     qp_json_integer(&json, "triangles", s->n_triangles);
     cli_tolerance_json(&json, w->scene->tolerance, s);
     qp_json_real(&json, "frame_ms", s->frame_ms);
+    cli_supports_json(&json, &o->supports, &s->supports);
     qp_json_text(&json, "stream_hash", hash);
     qp_json_text(&json, "device", qp_device_name(w->device));
     qp_json_text(&json, "gl", w->backend);
@@ -110,7 +115,7 @@ static void print_result(bool as_json, const char *scene, const char *picture, c
 }
 
 static qp_status run(int argc, char **argv, qp_error *err) {
-    overrides o = {0};
+    overrides o = {.supports = CLI_SUPPORTS_DEFAULTS};
     const char *picture = NULL;
     bool json = false;
     const cli_option options[] = {
@@ -128,6 +133,7 @@ static qp_status run(int argc, char **argv, qp_error *err) {
          QP_DEPTH_LIMIT, NULL},
         {"--device", "D", "host, P.D, or part of a name, as `quadplan devices` lists them", CLI_TEXT,
          &o.device, 0, 0, NULL},
+        CLI_SUPPORTS_OPTIONS(o.supports),
         {"--json", NULL, "print one JSON object", CLI_FLAG, &json, 0, 0, NULL},
         {0},
     };
@@ -142,7 +148,7 @@ static qp_status run(int argc, char **argv, qp_error *err) {
     status = draw(arguments.values[0], &o, &w, err);
     if (status == QP_OK) cli_tolerance_warn(w.scene->tolerance, &w.stream);
     if (status == QP_OK) status = qp_image_write(picture, &w.image, err);
-    if (status == QP_OK) print_result(json, arguments.values[0], picture, &w);
+    if (status == QP_OK) print_result(json, arguments.values[0], picture, &o, &w);
     work_free(&w);
     return status;
 }
