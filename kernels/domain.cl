@@ -451,6 +451,7 @@ QP_FUNCTION void QP_NAME(domain_patch)(__global const uint *heads, __global cons
     }
 }
 
+#if QP_WITH_STAGES
 __kernel void QP_NAME(domain)(__global const uint *heads, __global const uint *trees,
                               __global const real *reals, __global const uint *rings,
                               __global const real *positions, __global const uint *entries, uint first_entry,
@@ -463,3 +464,4 @@ __kernel void QP_NAME(domain)(__global const uint *heads, __global const uint *t
      (__global const real4 *)support + QP_ENTRY_WIDE(entry, QP_ENTRY_SUPPORT), grid_u, grid_v, vertices, flags,
      derivatives, want_derivatives);
 }
+#endif

@@ -178,6 +178,7 @@ QP_FUNCTION void QP_NAME(hull_patch)(__global const uint *heads, __global const 
     }
 }
 
+#if QP_WITH_STAGES
 __kernel void QP_NAME(hull)(__global const uint *heads, __global const uint *trees, __global const real *reals,
                             __global const uint *rings, __global const real *positions,
                             __global const uint *entries, uint first_entry, __global real *support QP_GROUP) {
@@ -189,3 +190,4 @@ __kernel void QP_NAME(hull)(__global const uint *heads, __global const uint *tre
     (heads, trees, reals, rings, positions, entry, entry[QP_ENTRY_ROWS],
      support + 4u * QP_ENTRY_WIDE(entry, QP_ENTRY_SUPPORT), ring_x, ring_y, ring_z);
 }
+#endif

@@ -6,7 +6,7 @@
  * of it. Nothing but correctly rounded operations is used: + - * fma, and / sqrt by way of qp_div and qp_sqrt
  * (real.h). Contraction is off in both languages.
  *
- * A program is the concatenation portable.h plan_layout.h frame_layout.h real.h spline.h and the stages'
+ * A program is the concatenation portable.h plan_layout.h frame_layout.h ring_layout.h ring.h real.h spline.h and the stages'
  * files. */
 #ifndef QP_KERNELS_PORTABLE_H
 #define QP_KERNELS_PORTABLE_H
@@ -32,6 +32,10 @@
 #define qp_atomic_swap(p, expected, value) (atomic_cmpxchg((p), (expected), (value)) == (expected))
 #define qp_release() mem_fence(CLK_GLOBAL_MEM_FENCE)
 #define qp_acquire() mem_fence(CLK_GLOBAL_MEM_FENCE)
+/* Once a round while an item waits for others. */
+#define qp_wait() ((void)0)
+/* With QP_KERNEL_CLOCK: ticks of a clock that all work-groups share. */
+#define qp_clock() ((ulong)__builtin_readcyclecounter())
 
 #else
 
@@ -45,12 +49,13 @@
 #define __global
 #define __local
 #define CLK_LOCAL_MEM_FENCE 0
+#define CLK_GLOBAL_MEM_FENCE 0
 #define barrier(fence) ((void)0)
 #define get_group_id(dimension) (qp_group)
 #define get_local_id(dimension) 0u
 #define get_local_size(dimension) 1u
 /* Inlining all costs some time to compile and is worth a fifth of the run time; with sanitizers it would cost minutes. */
-#if defined(__SANITIZE_ADDRESS__)
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define QP_FUNCTION static inline
 #else
 #define QP_FUNCTION static inline __attribute__((always_inline))
@@ -65,6 +70,12 @@
 #define qp_atomic_swap(p, expected, value) qp_host_atomic_swap((p), (expected), (value))
 #define qp_release() ((void)0)
 #define qp_acquire() ((void)0)
+/* host_kernels.c */
+void qp_host_wait(void);
+uint64_t qp_host_clock(void);
+#define qp_wait() qp_host_wait()
+#define QP_KERNEL_CLOCK 1
+#define qp_clock() qp_host_clock()
 static inline void qp_host_atomic_max(volatile uint32_t *p, uint32_t value) {
     uint32_t seen = __atomic_load_n(p, __ATOMIC_RELAXED);
     while (seen < value && !__atomic_compare_exchange_n(p, &seen, value, 0, __ATOMIC_ACQ_REL, __ATOMIC_RELAXED)) {}
@@ -90,6 +101,10 @@ static inline int qp_host_atomic_swap(volatile uint32_t *p, uint32_t expected, u
 #endif
 #ifndef QP_WITH_CORNERS
 #define QP_WITH_CORNERS 1
+#endif
+/* 0: the kernels `hull` and `domain` themselves are left out, where others call what they are made of. */
+#ifndef QP_WITH_STAGES
+#define QP_WITH_STAGES 1
 #endif
 
 #endif

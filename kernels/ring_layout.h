@@ -72,6 +72,9 @@
 #define QP_TICK_DONE 3u      /* its last sample is written */
 #define QP_TICK_RETIRED 4u   /* its points are free */
 
+/* Points of the buffer before the ring, and after it, that are nobody's. */
+#define QP_RB_MARGIN 16u
+
 /* Canaries: so many points before and after those of every patch, filled with a word that depends on the ticket. */
 #define QP_RB_GUARD 1u
 #define QP_RB_CANARY(ticket) (0x7fa5c31du ^ (ticket))

@@ -41,6 +41,18 @@ qp_status qp_buffer_write(qp_device *device, qp_buffer *buffer, const void *from
     return qp_cl_check(code, "clEnqueueWriteBuffer", device, err);
 }
 
+qp_status qp_buffer_read(qp_device *device, const qp_buffer *buffer, size_t offset, void *to, size_t bytes,
+                         qp_error *err) {
+    if (bytes == 0) return QP_OK;
+    if (device->host) {
+        memcpy(to, (const char *)buffer->host + offset, bytes);
+        return QP_OK;
+    }
+    cl_int code =
+        clEnqueueReadBuffer(device->queue, buffer->object, CL_TRUE, offset, bytes, to, 0, NULL, NULL);
+    return qp_cl_check(code, "clEnqueueReadBuffer", device, err);
+}
+
 qp_status qp_buffer_wrap(qp_device *device, qp_buffer *buffer, void *memory, size_t bytes, const char *what,
                          qp_error *err) {
     qp_buffer_free(device, buffer);

@@ -1,4 +1,5 @@
 /* Which devices there are, and opening one of them. */
+#include "host/device/host_kernels.h"
 #include "host/device/opencl.h"
 
 #include <ctype.h>
@@ -45,13 +46,17 @@ static void describe_device(cl_platform_id platform, uint32_t p, cl_device_id id
     info->rounds_correctly = (single & CL_FP_CORRECTLY_ROUNDED_DIVIDE_SQRT) != 0;
     /* Simulators and some compilers for processors that do have fma say no to the first alone. */
     info->slow_fma = (single & (CL_FP_FMA | CL_FP_DENORM)) == 0;
+#ifdef __x86_64__
+    /* PoCL compiles with clang, whose cycle counter is there the processor's time stamp, the same for all cores. */
+    info->has_clock = info->is_cpu && strstr(info->platform, "Portable Computing Language") != NULL;
+#endif
     info->compute_units = units;
     info->memory_bytes = memory;
     info->max_buffer_bytes = largest;
 }
 
 static void describe_host(qp_device_info *info) {
-    *info = (qp_device_info){.has_double = true, .is_cpu = true, .rounds_correctly = true};
+    *info = (qp_device_info){.has_double = true, .is_cpu = true, .rounds_correctly = true, .has_clock = true};
     snprintf(info->id, sizeof info->id, "host");
     snprintf(info->name, sizeof info->name, "host");
     snprintf(info->platform, sizeof info->platform, "quadplan");
@@ -237,4 +242,12 @@ const qp_device_info *qp_device_get_info(const qp_device *device) {
 
 bool qp_device_is_host(const qp_device *device) {
     return device->host;
+}
+
+uint64_t qp_device_ticks(const qp_device *device) {
+    if (device->host) return qp_host_clock();
+#ifdef __x86_64__
+    if (device->info.has_clock) return __builtin_ia32_rdtsc();
+#endif
+    return 0;
 }

@@ -12,6 +12,7 @@ typedef struct qp_device_info {
     char name[256], platform[256], version[256];
     bool has_double, is_cpu, rounds_correctly; /* divides and takes roots in float correctly rounded */
     bool slow_fma; /* has no fma in hardware, and its own program for it is to be avoided (kernels/real.h) */
+    bool has_clock; /* that kernels can read: qp_device_ticks */
     uint32_t compute_units;
     uint64_t memory_bytes, max_buffer_bytes;
 } qp_device_info;
@@ -28,6 +29,8 @@ size_t qp_device_choose(const qp_device_info *list, size_t n, const char *which)
 /* Filled in when the device was opened; owned by it. */
 const qp_device_info *qp_device_get_info(const qp_device *device);
 bool qp_device_is_host(const qp_device *device);
+/* The clock that kernels of this device read, now; 0 where they have none. */
+uint64_t qp_device_ticks(const qp_device *device);
 
 /* ---- Memory ---- */
 
@@ -47,6 +50,9 @@ qp_status qp_buffer_reserve(qp_device *device, qp_buffer *buffer, size_t bytes, 
 /* Copies bytes from host memory to the start of the buffer. */
 qp_status qp_buffer_write(qp_device *device, qp_buffer *buffer, const void *from, size_t bytes,
                           qp_error *err);
+/* Waits, and copies `bytes` from `offset` on to host memory. */
+qp_status qp_buffer_read(qp_device *device, const qp_buffer *buffer, size_t offset, void *to, size_t bytes,
+                         qp_error *err);
 /* Makes host memory, which must outlive the buffer, the store of a buffer that kernels write. */
 qp_status qp_buffer_wrap(qp_device *device, qp_buffer *buffer, void *memory, size_t bytes, const char *what,
                          qp_error *err);
@@ -58,7 +64,7 @@ void qp_buffer_free(qp_device *device, qp_buffer *buffer);
 
 /* ---- Kernels ---- */
 
-typedef enum qp_kernel_id { QP_KERNEL_HULL, QP_KERNEL_DOMAIN, QP_KERNEL_REGULAR, QP_KERNELS } qp_kernel_id;
+typedef enum qp_kernel_id { QP_KERNEL_HULL, QP_KERNEL_DOMAIN, QP_KERNEL_REGULAR, QP_KERNEL_FUSED, QP_KERNELS } qp_kernel_id;
 
 /* Zero-initialise; free with qp_program_free. */
 typedef struct qp_program {

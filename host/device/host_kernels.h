@@ -15,11 +15,15 @@ typedef void (*qp_host_kernel)(const qp_host_arg *args, size_t group);
 
 /* One entry a qp_kernel_id (device.h). */
 typedef struct qp_host_kernels {
-    qp_host_kernel hull, domain, regular;
+    qp_host_kernel hull, domain, regular, fused;
 } qp_host_kernels;
 
 /* The best build of the kernels for this processor. All builds give the same bits. */
 const qp_host_kernels *qp_host_kernels_for(qp_precision precision);
+
+/* What kernels call when they wait for another work-group, and their clock, in nanoseconds. */
+void qp_host_wait(void);
+uint64_t qp_host_clock(void);
 
 /* Builds by instruction set, by qp_precision; the second one exists on x86-64 only. */
 extern const qp_host_kernels qp_host_kernels_any[2];

@@ -4,6 +4,9 @@
 #include "kernels/frame_layout.h"
 #include "kernels/plan_layout.h"
 #include "kernels/portable.h"
+#include "kernels/ring_layout.h"
+
+#include "kernels/ring.h"
 
 #include "kernels/real.h"
 #include "kernels/spline.h"
@@ -11,6 +14,8 @@
 #include "kernels/domain.cl"
 #include "kernels/hull.cl"
 #include "kernels/regular.cl"
+
+#include "kernels/fused.cl"
 
 #include "kernels/real_end.h"
 
@@ -22,6 +27,8 @@
 #include "kernels/domain.cl"
 #include "kernels/hull.cl"
 #include "kernels/regular.cl"
+
+#include "kernels/fused.cl"
 
 #include "kernels/real_end.h"
 
@@ -39,12 +46,17 @@
     static void run_regular_##suffix(const qp_host_arg *a, size_t group) {                                   \
         regular_##suffix(a[0].memory, a[1].memory, a[2].memory, a[3].number, a[4].memory, a[5].memory,       \
                          a[6].memory, a[7].memory, a[8].memory, a[9].number, group);                                                   \
+    }                                                                                                        \
+    static void run_fused_##suffix(const qp_host_arg *a, size_t group) {                                     \
+        fused_##suffix(a[0].memory, a[1].memory, a[2].memory, a[3].memory, a[4].memory, a[5].memory,         \
+                       a[6].number, a[7].memory, a[8].memory, a[9].memory, a[10].memory, a[11].memory,       \
+                       a[12].memory, a[13].memory, a[14].number, group);                                     \
     }
 
 QP_HOST_THUNKS(float)
 QP_HOST_THUNKS(double)
 
 const qp_host_kernels QP_HOST_TABLE[2] = {
-    [QP_FLOAT] = {run_hull_float, run_domain_float, run_regular_float},
-    [QP_DOUBLE] = {run_hull_double, run_domain_double, run_regular_double},
+    [QP_FLOAT] = {run_hull_float, run_domain_float, run_regular_float, run_fused_float},
+    [QP_DOUBLE] = {run_hull_double, run_domain_double, run_regular_double, run_fused_double},
 };

@@ -2,7 +2,7 @@
 #include "host/device/host_kernels.h"
 #include "host/device/opencl.h"
 
-enum { MAX_ARGS = 16 };
+enum { MAX_ARGS = 24 };
 
 /* Work-items a group. A processor needs no more than the hull stage's 32, as the paper has it; for the sample loops one item is
  * enough there, whose lanes are in the kernels (and in Mesa 22.3 items of one group that walk a tree by different ways disturb each
@@ -27,6 +27,7 @@ static void launch_host(const qp_program *program, qp_kernel_id kernel, const qp
                         uint32_t groups, double *ms) {
     host_launch launch = {.kernel = kernel == QP_KERNEL_HULL     ? program->host->hull
                                     : kernel == QP_KERNEL_DOMAIN ? program->host->domain
+                                    : kernel == QP_KERNEL_FUSED  ? program->host->fused
                                                                  : program->host->regular};
     for (uint32_t i = 0; i < n_args; ++i) {
         launch.args[i].memory = args[i].buffer != NULL ? args[i].buffer->host : NULL;

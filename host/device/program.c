@@ -8,15 +8,19 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char *const shared_sources[] = {"portable.h", "plan_layout.h", "frame_layout.h", "real.h",
+static const char *const shared_sources[] = {"portable.h", "plan_layout.h", "frame_layout.h",
+                                             "ring_layout.h", "ring.h", "real.h",
                                              "spline.h"};
 enum { SHARED_SOURCES = sizeof shared_sources / sizeof shared_sources[0] };
+/* parts: kernels (1 << qp_kernel_id) whose files it calls functions of. */
 static const struct {
     const char *kernel, *file;
+    unsigned parts;
 } stages[QP_KERNELS] = {
     [QP_KERNEL_HULL] = {"hull", "hull.cl"},
     [QP_KERNEL_DOMAIN] = {"domain", "domain.cl"},
     [QP_KERNEL_REGULAR] = {"regular", "regular.cl"},
+    [QP_KERNEL_FUSED] = {"fused", "fused.cl", 1u << QP_KERNEL_HULL | 1u << QP_KERNEL_DOMAIN},
 };
 
 /* One source file, malloced with a NUL: from the folder when it is given, else from the library. */
@@ -75,19 +79,21 @@ static qp_status report_build(const qp_device *device, cl_program program, cl_in
                    device->info.name, qp_cl_error_name(code), first[0] != '\0' ? ", " : "", first);
 }
 
-static void write_options(const qp_device *device, qp_precision precision, uint32_t plan_flags, char *options,
-                          size_t size) {
+static void write_options(const qp_device *device, qp_precision precision, unsigned kernels, uint32_t plan_flags,
+                          char *options, size_t size) {
     bool correct = device->info.rounds_correctly;
     snprintf(
         options, size,
         "-cl-std=CL1.2%s%s%s -DQP_LANES=%u -DQP_WITH_INTERNAL=%d -DQP_WITH_CREASE=%d -DQP_WITH_TERMINAL=%d "
-        "-DQP_WITH_CORNERS=%d",
+        "-DQP_WITH_CORNERS=%d%s%s",
         correct ? " -cl-fp32-correctly-rounded-divide-sqrt -DQP_CORRECT_DIVIDE" : "",
         precision == QP_DOUBLE ? " -DQP_REAL_DOUBLE" : "",
         precision == QP_FLOAT && device->info.slow_fma ? " -DQP_SOFT_FMA" : "",
         precision == QP_DOUBLE ? device->lanes_double : device->lanes_float,
         (plan_flags & QP_PLAN_INTERNAL) != 0, (plan_flags & QP_PLAN_CREASE) != 0,
-        (plan_flags & QP_PLAN_TERMINAL) != 0, (plan_flags & QP_PLAN_CORNERS) != 0);
+        (plan_flags & QP_PLAN_TERMINAL) != 0, (plan_flags & QP_PLAN_CORNERS) != 0,
+        (kernels & (1u << QP_KERNEL_HULL | 1u << QP_KERNEL_DOMAIN)) != 0 ? "" : " -DQP_WITH_STAGES=0",
+        device->info.has_clock ? " -DQP_KERNEL_CLOCK" : "");
 }
 
 static qp_status build_sources(qp_device *device, const char **sources, cl_uint n, const char *options,
@@ -121,12 +127,14 @@ qp_status qp_program_build(qp_device *device, qp_precision precision, unsigned k
     qp_status status = QP_OK;
     for (int i = 0; i < SHARED_SOURCES && status == QP_OK; ++i, ++n)
         status = load_source(folder, shared_sources[i], &texts[n], err);
+    unsigned files = kernels;
+    for (int k = 0; k < QP_KERNELS; ++k) files |= (kernels & 1u << k) != 0 ? stages[k].parts : 0u;
     for (int k = 0; k < QP_KERNELS && status == QP_OK; ++k) {
-        if ((kernels & 1u << k) != 0) status = load_source(folder, stages[k].file, &texts[n++], err);
+        if ((files & 1u << k) != 0) status = load_source(folder, stages[k].file, &texts[n++], err);
     }
     if (status == QP_OK) {
         char options[512];
-        write_options(device, precision, plan_flags, options, sizeof options);
+        write_options(device, precision, kernels, plan_flags, options, sizeof options);
         status = build_sources(device, (const char **)texts, n, options, kernels, program, err);
     }
     for (cl_uint i = 0; i < n; ++i) free(texts[i]);
