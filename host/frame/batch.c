@@ -50,9 +50,8 @@ static qp_status cut_batch(qp_frame *frame, size_t begin, size_t *end, uint32_t 
         const qp_frame_item *item = &layout->items[i];
         const bool fast = qp_frame_is_fast(frame, item->patch);
         const uint64_t points = fast ? 0 : item_rows(frame, item);
-        if (i > begin &&
-            (batch->n_samples + item->samples > most_samples || batch->points + points > most_points))
-            break;
+        const bool full = batch->points + points > most_points && !qp_frame_is_fused(frame);
+        if (i > begin && (batch->n_samples + item->samples > most_samples || full)) break;
         batch->n_samples += item->samples;
         batch->points += points;
         frame->all_points += points;
@@ -72,8 +71,8 @@ static qp_status cut_batch(qp_frame *frame, size_t begin, size_t *end, uint32_t 
 }
 
 /* Entries of one batch: those of the general kernels first, in order of their plans, so that patches with the
- * same weights follow each other. count: scratch, [n_plans + 1]. */
-static void write_batch(const qp_frame *frame, const qp_frame_batch *batch, size_t begin, size_t end,
+ * same weights follow each other, unless the order of patches is asked for. count: scratch, [n_plans + 1]. */
+static void write_batch(qp_frame *frame, const qp_frame_batch *batch, size_t begin, size_t end,
                         uint32_t *count, uint32_t *entries) {
     const qp_frame_layout *layout = &frame->layout;
     uint32_t regular = batch->first_regular;
@@ -83,20 +82,24 @@ static void write_batch(const qp_frame *frame, const qp_frame_batch *batch, size
         if (!qp_frame_is_fast(frame, patch)) ++count[qp_frame_plan_of(frame, patch).index + 1];
     }
     for (uint32_t p = 0; p < frame->n_plans; ++p) count[p + 1] += count[p];
+    const bool by_patch = frame->options.supports.issue_order == QP_ISSUE_BY_PATCH;
+    uint32_t next = batch->first_general;
     uint64_t support = 0;
     for (size_t i = begin; i < end; ++i) {
         const qp_frame_item *item = &layout->items[i];
         if (qp_frame_is_fast(frame, item->patch)) {
             write_entry(frame, item, batch, 0, entries + QP_ENTRY_WORDS * (size_t)regular++);
         } else {
-            uint32_t at = batch->first_general + count[qp_frame_plan_of(frame, item->patch).index]++;
+            const uint32_t of_plan = batch->first_general + count[qp_frame_plan_of(frame, item->patch).index]++;
+            const uint32_t at = by_patch ? next++ : of_plan;
+            qp_ring_note(frame, at, i);
             write_entry(frame, item, batch, support, entries + QP_ENTRY_WORDS * (size_t)at);
             support += item_rows(frame, item);
         }
     }
 }
 
-static qp_status write_entries(const qp_frame *frame, uint32_t **entries, const size_t *ends, qp_error *err) {
+static qp_status write_entries(qp_frame *frame, uint32_t **entries, const size_t *ends, qp_error *err) {
     const size_t bytes = frame->layout.n_items * QP_ENTRY_WORDS * sizeof(uint32_t);
     uint32_t *count = qp_alloc((size_t)frame->n_plans + 1, sizeof *count, false);
     *entries = qp_alloc(frame->layout.n_items, QP_ENTRY_WORDS * sizeof(uint32_t), false);
@@ -189,6 +192,7 @@ qp_status qp_frame_upload_layout(qp_frame *frame, qp_error *err) {
         if (status == QP_OK) ends[frame->n_batches - 1] = end;
         begin = end;
     }
+    if (status == QP_OK) status = qp_ring_start_notes(frame, err);
     if (status == QP_OK) status = write_entries(frame, &entries, ends, err);
     if (status == QP_OK)
         status = qp_frame_upload(frame, &frame->entries, entries, layout->n_items * QP_ENTRY_WORDS * sizeof(uint32_t),
@@ -197,7 +201,9 @@ qp_status qp_frame_upload_layout(qp_frame *frame, qp_error *err) {
         status = upload_grid(frame, &frame->grid_u, layout->grid_u, layout->grid_points, err);
     if (status == QP_OK)
         status = upload_grid(frame, &frame->grid_v, layout->grid_v, layout->grid_points, err);
-    if (status == QP_OK)
+    if (status == QP_OK && qp_frame_is_fused(frame))
+        status = qp_ring_reserve(frame, err);
+    else if (status == QP_OK)
         status = qp_buffer_reserve(frame->device, &frame->support,
                                    (size_t)frame->peak_points * 4 * frame->real_size, "control points", err);
     if (status == QP_OK) status = wrap_stream(frame, err);
@@ -228,6 +234,8 @@ void qp_frame_drop_layout(qp_frame *frame) {
         qp_buffer_free(frame->device, &frame->batches[b].derivatives);
     }
     free(frame->batches);
+    free(frame->ring.items);
+    frame->ring.items = NULL;
     frame->batches = NULL;
     frame->n_batches = 0;
     frame->peak_points = frame->all_points = frame->largest_points = frame->peak_patches = 0;

@@ -75,6 +75,7 @@ void qp_frame_free(qp_frame *frame) {
                                   &frame->rings,  &frame->positions, &frame->entries,
                                   &frame->grid_u, &frame->grid_v,    &frame->support};
     for (size_t i = 0; i < sizeof buffers / sizeof buffers[0]; ++i) qp_buffer_free(frame->device, buffers[i]);
+    qp_ring_free(frame);
     qp_program_free(&frame->program);
     qp_frame_drop_deep(frame);
     free(frame->patch_factors);
@@ -90,7 +91,8 @@ void qp_frame_free(qp_frame *frame) {
 /* Starts the kernels of every batch. */
 static qp_status launch_batches(qp_frame *frame, double *hull_ms, double *domain_ms, qp_error *err) {
     const uint32_t want = frame->options.want_derivatives != 0;
-    qp_status status = QP_OK;
+    const bool fused = qp_frame_is_fused(frame);
+    qp_status status = fused ? qp_ring_reset(frame, err) : QP_OK;
     for (size_t b = 0; b < frame->n_batches && status == QP_OK; ++b) {
         qp_frame_batch *batch = &frame->batches[b];
         status = qp_buffer_unmap(frame->device, &batch->vertices, err);
@@ -111,10 +113,11 @@ static qp_status launch_batches(qp_frame *frame, double *hull_ms, double *domain
                                   {&frame->grid_u, 0},   {&frame->grid_v, 0},
                                   {&batch->vertices, 0}, {&batch->flags, 0},
                                   {derivatives, 0},      {NULL, want}};
-        if (status == QP_OK)
+        if (status == QP_OK && fused) status = qp_ring_launch(frame, b, domain_ms, err);
+        if (status == QP_OK && !fused)
             status = qp_launch(frame->device, &frame->program, QP_KERNEL_HULL, hull,
                                sizeof hull / sizeof hull[0], batch->n_general, hull_ms, err);
-        if (status == QP_OK)
+        if (status == QP_OK && !fused)
             status = qp_launch(frame->device, &frame->program, QP_KERNEL_DOMAIN, domain,
                                sizeof domain / sizeof domain[0], batch->n_general, domain_ms, err);
         if (status == QP_OK)
@@ -202,6 +205,7 @@ static qp_status evaluate(qp_frame *frame, qp_stream *stream, qp_error *err) {
         if (status == QP_OK && frame->options.want_derivatives)
             status = qp_buffer_map(frame->device, &frame->batches[b].derivatives, err);
     }
+    if (status == QP_OK && qp_frame_is_fused(frame)) status = qp_ring_report(frame, stream, err);
     if (status == QP_OK) qp_copies_apply(&layout->copies, frame->real_size, frame->vertices, frame->flags);
     if (status == QP_OK && layout->order != NULL) {
         order_job job = {frame, sample_bytes};

@@ -3,6 +3,7 @@
 #define QP_FRAME_FRAME_H
 
 #include "host/device/device.h"
+#include "host/frame/ring_buffer.h"
 #include "host/frame/share.h"
 #include "host/frame/tolerance.h"
 #include "host/plan/plan.h"
@@ -81,6 +82,7 @@ struct qp_frame {
     uint8_t *light;     /* [n_patches] step within the tolerance of options, QP_LIGHT_NONE: none is; NULL: not yet chosen */
     double light_bound; /* of their errors, of the diagonal */
     qp_buffer entries, grid_u, grid_v, support;      /* of the layout */
+    qp_ring_buffer ring;                             /* in place of support, where the frame is fused */
 
     qp_frame_layout layout;
     bool tessellated; /* layout is of the tessellation below, and everything is uploaded */

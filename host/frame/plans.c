@@ -173,7 +173,8 @@ static qp_status build_kernels(qp_frame *frame, qp_error *err) {
             if (step == 0 && qp_frame_is_fast(frame, p)) {
                 kernels |= 1u << QP_KERNEL_REGULAR;
             } else {
-                kernels |= 1u << QP_KERNEL_HULL | 1u << QP_KERNEL_DOMAIN;
+                kernels |= qp_frame_is_fused(frame) ? 1u << QP_KERNEL_FUSED
+                                                    : 1u << QP_KERNEL_HULL | 1u << QP_KERNEL_DOMAIN;
                 flags |= surface->plans[surface->patch_plan[p]]->flags;
             }
         }
