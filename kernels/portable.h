@@ -32,8 +32,16 @@
 #define qp_atomic_swap(p, expected, value) (atomic_cmpxchg((p), (expected), (value)) == (expected))
 #define qp_release() mem_fence(CLK_GLOBAL_MEM_FENCE)
 #define qp_acquire() mem_fence(CLK_GLOBAL_MEM_FENCE)
-/* Once a round while an item waits for others. */
+/* Once a round while an item waits for others. Where kernels run on Linux as code of the processor's own (QP_KERNEL_YIELD: 24 is
+ * sched_yield), the thread makes room, for the one that is waited for may have been put aside in its favour. */
+#ifdef QP_KERNEL_YIELD
+QP_FUNCTION void qp_wait(void) {
+    long call = 24;
+    __asm__ volatile("syscall" : "+a"(call) : : "rcx", "r11", "memory");
+}
+#else
 #define qp_wait() ((void)0)
+#endif
 /* With QP_KERNEL_CLOCK: ticks of a clock that all work-groups share. */
 #define qp_clock() ((ulong)__builtin_readcyclecounter())
 

@@ -49,6 +49,9 @@ static void describe_device(cl_platform_id platform, uint32_t p, cl_device_id id
 #ifdef __x86_64__
     /* PoCL compiles with clang, whose cycle counter is there the processor's time stamp, the same for all cores. */
     info->has_clock = info->is_cpu && strstr(info->platform, "Portable Computing Language") != NULL;
+#ifdef __linux__
+    info->is_native = info->has_clock;
+#endif
 #endif
     info->compute_units = units;
     info->memory_bytes = memory;
