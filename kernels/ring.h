@@ -116,6 +116,16 @@ QP_FUNCTION uint ring_wait_for_room(volatile __global uint *ring, uint claimed, 
     return used;
 }
 
+/* Canaries before and after the points of p. */
+QP_FUNCTION void ring_plant(volatile __global uint *ring, __global uint *memory, uint point_words,
+                            ring_patch p) {
+    const uint guard = (ring[QP_RB_OPTIONS] & QP_RB_CANARIES) != 0 ? QP_RB_GUARD : 0u;
+    for (uint i = 0; i < guard * point_words; ++i) {
+        memory[(ulong)(p.first - guard) * point_words + i] = QP_RB_CANARY(p.ticket);
+        memory[(ulong)(p.first + p.points) * point_words + i] = QP_RB_CANARY(p.ticket);
+    }
+}
+
 /* The place of p's `points` points in the ring. */
 QP_FUNCTION void ring_allocate(volatile __global uint *ring, __global uint *memory, uint point_words,
                                uint points, ring_patch *p) {
@@ -146,10 +156,7 @@ QP_FUNCTION void ring_allocate(volatile __global uint *ring, __global uint *memo
     qp_release();
     qp_atomic_store(ring + QP_RB_TURN, p->ticket + 1u);
     ring_tick(ring, p->ticket, QP_TICK_ALLOCATED);
-    for (uint i = 0; i < guard * point_words; ++i) {
-        memory[(ulong)(p->first - guard) * point_words + i] = QP_RB_CANARY(p->ticket);
-        memory[(ulong)(p->first + points) * point_words + i] = QP_RB_CANARY(p->ticket);
-    }
+    ring_plant(ring, memory, point_words, *p);
 }
 
 /* Gives back the points of the oldest ticket. One caller at a time. */
@@ -195,12 +202,17 @@ QP_FUNCTION int ring_is_whole(volatile __global uint *ring, __global const uint 
     return dead == 0;
 }
 
+/* Reports p if they are not. */
+QP_FUNCTION void ring_inspect(volatile __global uint *ring, __global const uint *memory, uint point_words,
+                              ring_patch p) {
+    if (ring_is_whole(ring, memory, point_words, p)) return;
+    qp_atomic_add(ring + QP_RB_BROKEN, 1u);
+    qp_atomic_store(ring + QP_RB_FIRST_BROKEN, p.ticket + 1u);
+}
+
 QP_FUNCTION void ring_retire(volatile __global uint *ring, __global const uint *memory, uint point_words,
                              ring_patch p) {
-    if (!ring_is_whole(ring, memory, point_words, p)) {
-        qp_atomic_add(ring + QP_RB_BROKEN, 1u);
-        qp_atomic_store(ring + QP_RB_FIRST_BROKEN, p.ticket + 1u);
-    }
+    ring_inspect(ring, memory, point_words, p);
     ring_tick(ring, p.ticket, QP_TICK_DONE);
     qp_release();
     if ((ring[QP_RB_OPTIONS] & QP_RB_IN_ORDER) != 0) {

@@ -225,6 +225,11 @@ void qp_device_free(qp_device *device) {
         clFinish(device->queue);
         clReleaseCommandQueue(device->queue);
     }
+    for (size_t i = 0; i < QP_QUEUES - 1; ++i) {
+        if (device->more_queues[i] == NULL) continue;
+        clFinish(device->more_queues[i]);
+        clReleaseCommandQueue(device->more_queues[i]);
+    }
     for (size_t i = 0; i < device->n_pending; ++i) clReleaseEvent(device->pending[i].event);
     free(device->pending);
     if (device->context != NULL) clReleaseContext(device->context);

@@ -65,7 +65,15 @@ void qp_buffer_free(qp_device *device, qp_buffer *buffer);
 
 /* ---- Kernels ---- */
 
-typedef enum qp_kernel_id { QP_KERNEL_HULL, QP_KERNEL_DOMAIN, QP_KERNEL_REGULAR, QP_KERNEL_FUSED, QP_KERNELS } qp_kernel_id;
+typedef enum qp_kernel_id {
+    QP_KERNEL_HULL,
+    QP_KERNEL_DOMAIN,
+    QP_KERNEL_REGULAR,
+    QP_KERNEL_FUSED,
+    QP_KERNEL_STREAM_HULL,
+    QP_KERNEL_STREAM_DOMAIN,
+    QP_KERNELS
+} qp_kernel_id;
 
 /* Zero-initialise; free with qp_program_free. */
 typedef struct qp_program {
@@ -92,6 +100,28 @@ typedef struct qp_arg {
  * (by the device's own clock; by the wall clock on the host): *ms must live until then. */
 qp_status qp_launch(qp_device *device, const qp_program *program, qp_kernel_id kernel, const qp_arg *args,
                     uint32_t n_args, uint32_t groups, double *ms, qp_error *err);
+
+/* Launches that others wait for, in several queues. A queue runs its launches one after the other; those of different queues run in
+ * any order, or at one time, but for what they wait for. Everything else of this file is in queue 0. On the host a launch is done when
+ * the call returns, whatever the queue: launches run in the order in which they are given. */
+enum { QP_QUEUES = 3 };
+/* A launch that was given. Must live until qp_device_finish, which fills in when it ran, by the clock that times launches, in
+ * milliseconds; both 0 where the device has none. */
+typedef struct qp_event {
+    void *object; /* cl_event, of the device */
+    double start_ms, end_ms;
+} qp_event;
+/* Where a launch goes, and what it waits for: launches that were given before, in any queue. Zero-initialise for queue 0. */
+typedef struct qp_turn {
+    unsigned queue;               /* below QP_QUEUES */
+    const qp_event *const *after; /* [n_after] */
+    uint32_t n_after;
+    qp_event *event; /* or NULL */
+} qp_turn;
+qp_status qp_launch_in_turn(qp_device *device, const qp_program *program, qp_kernel_id kernel,
+                            const qp_arg *args, uint32_t n_args, uint32_t groups, const qp_turn *turn,
+                            double *ms, qp_error *err);
+
 /* Waits for everything that was started. */
 qp_status qp_device_finish(qp_device *device, qp_error *err);
 

@@ -10,6 +10,7 @@
 typedef struct qp_pending {
     cl_event event;
     double *ms;
+    qp_event *asked; /* or NULL */
 } qp_pending;
 
 struct qp_device {
@@ -17,7 +18,7 @@ struct qp_device {
     bool host;
     cl_device_id id;
     cl_context context;
-    cl_command_queue queue;
+    cl_command_queue queue, more_queues[QP_QUEUES - 1]; /* the latter when they are first used */
     uint32_t lanes_float, lanes_double; /* of the device's registers; 1 where items are lanes themselves */
     uint32_t items;      /* work-items of every group, from QUADPLAN_GROUP_ITEMS; 0: as each kernel likes */
     qp_pending *pending; /* launches whose time is still to be read */

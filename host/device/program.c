@@ -21,6 +21,8 @@ static const struct {
     [QP_KERNEL_DOMAIN] = {"domain", "domain.cl"},
     [QP_KERNEL_REGULAR] = {"regular", "regular.cl"},
     [QP_KERNEL_FUSED] = {"fused", "fused.cl", 1u << QP_KERNEL_HULL | 1u << QP_KERNEL_DOMAIN},
+    [QP_KERNEL_STREAM_HULL] = {"stream_hull", "stream_hull.cl", 1u << QP_KERNEL_HULL},
+    [QP_KERNEL_STREAM_DOMAIN] = {"stream_domain", "stream_domain.cl", 1u << QP_KERNEL_DOMAIN},
 };
 
 /* One source file, malloced with a NUL: from the folder when it is given, else from the library. */
