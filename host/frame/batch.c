@@ -1,5 +1,5 @@
 /* Cuts a layout into batches that fit the device, and hands it over. Within a batch the scratch buffer holds
- * each patch's rows[level] control points one after the other: the worst case, as nothing is released before
+ * each patch's rows[need] control points one after the other: the worst case, as nothing is released before
  * the batch is done. (The paper gives every patch as many points as the deepest one needs; prefix sums cost
  * nothing here, because the host knows every patch's level.) */
 #include "host/frame/frame.h"
@@ -13,7 +13,7 @@ static void put_wide(uint32_t *word, uint64_t value) {
 }
 
 static uint32_t item_rows(const qp_frame *frame, const qp_frame_item *item) {
-    return qp_frame_plan_of(frame, item->patch).plan->rows[item->level];
+    return qp_frame_plan_of(frame, item->patch).plan->rows[item->need];
 }
 
 static void write_entry(const qp_frame *frame, const qp_frame_item *item, const qp_frame_batch *batch,

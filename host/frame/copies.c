@@ -15,13 +15,13 @@ static double signed_of(double x) {
 static qp_ghost ghost_on_edge(qp_side side, double t) {
     switch (side.index) {
     case 0:
-        return (qp_ghost){side.patch, t, 0.0};
+        return (qp_ghost){side.patch, QP_LEVELS - 1, t, 0.0};
     case 1:
-        return (qp_ghost){side.patch, -0.0, t};
+        return (qp_ghost){side.patch, QP_LEVELS - 1, -0.0, t};
     case 2:
-        return (qp_ghost){side.patch, qp_coordinate_mirrored(t), -0.0};
+        return (qp_ghost){side.patch, QP_LEVELS - 1, qp_coordinate_mirrored(t), -0.0};
     default:
-        return (qp_ghost){side.patch, 0.0, qp_coordinate_mirrored(t)};
+        return (qp_ghost){side.patch, QP_LEVELS - 1, 0.0, qp_coordinate_mirrored(t)};
     }
 }
 static qp_ghost ghost_at_corner(qp_side side) {
@@ -73,14 +73,50 @@ static uint64_t add_ghost(sink *s, qp_ghost ghost) {
 
 /* ---- Tessellations ---- */
 
-enum { BLOCK = 256 }; /* faces a sink */
-
 typedef struct share_job {
     const qp_share *share;
-    const uint64_t *first_part;
-    const qp_share_part *parts;
-    sink *sinks; /* one a block of faces */
+    const qp_share_parts *parts;
+    uint32_t block; /* patches a sink */
+    sink *sinks;    /* one a block */
 } share_job;
+
+/* Samples of other patches have numbers of their own: this bit, the part, and which one of it. */
+#define OUTSIDE (UINT64_C(1) << 62)
+enum { OUTSIDE_SHIFT = 16 }; /* no rim has so many */
+
+/* The parts of a patch, and how many there are. */
+static const qp_share_part *find_parts(const qp_share_parts *all, uint32_t patch, size_t *n) {
+    const size_t *place;
+    if (patch >= all->first && patch < all->end) {
+        place = all->first_part + (patch - all->first);
+    } else {
+        size_t low = 0, high = all->n_others;
+        while (low < high) {
+            const size_t middle = low + (high - low) / 2;
+            if (all->others[middle] < patch)
+                low = middle + 1;
+            else
+                high = middle;
+        }
+        place = all->others_part + low;
+    }
+    *n = place[1] - place[0];
+    return all->parts + place[0];
+}
+
+/* Number of a sample of a part. */
+static uint64_t part_sample(const share_job *job, const qp_share_part *part, uint32_t at) {
+    if (part->patch >= job->parts->first && part->patch < job->parts->end) return part->out + at;
+    return OUTSIDE | (uint64_t)(part - job->parts->parts) << OUTSIDE_SHIFT | at;
+}
+
+/* A sample to copy from: one of the stream as it is, another one as a ghost. */
+static uint64_t source_of(const share_job *job, sink *s, uint64_t sample) {
+    if ((sample & OUTSIDE) == 0) return sample;
+    const qp_share_part *part = &job->parts->parts[(sample & ~OUTSIDE) >> OUTSIDE_SHIFT];
+    const float *uv = part->uv + 2 * (size_t)(sample & ((1u << OUTSIDE_SHIFT) - 1));
+    return add_ghost(s, (qp_ghost){part->patch, part->level, (double)uv[0], (double)uv[1]});
+}
 
 /* Samples along one edge of a patch, in its direction; both ends included, and the middle twice when the patch is quartered. */
 typedef struct run {
@@ -92,11 +128,12 @@ typedef struct run {
 static const uint8_t quarters[4][2] = {{0, 1}, {1, 3}, {3, 2}, {2, 0}};
 
 static run open_run(const share_job *job, qp_side side) {
-    const uint64_t first = job->first_part[side.patch], n = job->first_part[side.patch + 1] - first;
+    size_t n;
+    const qp_share_part *parts = find_parts(job->parts, side.patch, &n);
     run r = {.edge = side.index};
     for (uint32_t i = 0; i < 2 && i < n; ++i) {
         if (n == 1 && i == 1) break;
-        const qp_share_part *part = &job->parts[n == 1 ? first : first + quarters[side.index][i]];
+        const qp_share_part *part = &parts[n == 1 ? 0 : quarters[side.index][i]];
         const qp_rim *rim = part->rim;
         const uint32_t begin = rim->corner[side.index], end = rim->corner[(side.index + 1) & 3u];
         r.part[i] = part;
@@ -106,25 +143,25 @@ static run open_run(const share_job *job, qp_side side) {
 }
 
 /* Sample j of a run, and the place it has along the edge. */
-static uint64_t run_sample(const run *r, uint32_t j, float *t) {
+static uint64_t run_sample(const share_job *job, const run *r, uint32_t j, float *t) {
     const uint32_t i = j >= r->count[0], k = j - (i ? r->count[0] : 0);
     const qp_share_part *part = r->part[i];
     uint32_t at = part->rim->corner[r->edge] + k;
     if (at >= part->rim->count) at -= part->rim->count;
     const float *uv = part->uv + 2 * (size_t)at, x = (r->edge & 1u) ? uv[1] : uv[0];
     *t = r->edge < 2 ? x : 1.0f - x;
-    return part->out + at;
+    return part_sample(job, part, at);
 }
 
 /* The sample of a run that lies exactly at t; *near: where to begin to look, and where it was. */
-static bool find_sample(const run *r, float t, uint32_t *near, uint64_t *sample) {
+static bool find_sample(const share_job *job, const run *r, float t, uint32_t *near, uint64_t *sample) {
     const uint32_t count = r->count[0] + r->count[1];
     uint32_t j = *near < count ? *near : count - 1;
     float at;
     if (count == 0) return false;
-    *sample = run_sample(r, j, &at);
-    while (at < t && j + 1 < count) *sample = run_sample(r, ++j, &at);
-    while (at > t && j > 0) *sample = run_sample(r, --j, &at);
+    *sample = run_sample(job, r, j, &at);
+    while (at < t && j + 1 < count) *sample = run_sample(job, r, ++j, &at);
+    while (at > t && j > 0) *sample = run_sample(job, r, --j, &at);
     *near = j;
     return at == t;
 }
@@ -139,7 +176,7 @@ static void share_edge(const share_job *job, sink *s, qp_side side, const qp_edg
     const uint8_t fields = QP_SHARE_POSITION | (owner->normal ? QP_SHARE_NORMAL : QP_SHARE_DEPTH);
     for (uint32_t j = 1; j + 1 < count; ++j) {
         float t;
-        const uint64_t to = run_sample(&mine, j, &t);
+        const uint64_t to = run_sample(job, &mine, j, &t);
         uint32_t half = 0;
         if (owner->reversed) t = 1.0f - t;
         if (owner->split) {
@@ -147,7 +184,9 @@ static void share_edge(const share_job *job, sink *s, qp_side side, const qp_edg
             t = half ? 2.0f * t - 1.0f : 2.0f * t;
         }
         uint64_t from;
-        if (!find_sample(&theirs[half], t, &near[half], &from))
+        if (find_sample(job, &theirs[half], t, &near[half], &from))
+            from = source_of(job, s, from);
+        else
             from = add_ghost(s, ghost_on_edge(owner->side[half], signed_of((double)t)));
         add_copy(s, to, from, fields);
     }
@@ -155,10 +194,11 @@ static void share_edge(const share_job *job, sink *s, qp_side side, const qp_edg
 
 /* The sample at a corner of a patch; false when the patch has none. */
 static bool corner_sample(const share_job *job, qp_side side, uint64_t *sample) {
-    const uint64_t first = job->first_part[side.patch], n = job->first_part[side.patch + 1] - first;
+    size_t n;
+    const qp_share_part *parts = find_parts(job->parts, side.patch, &n);
     if (n == 0) return false;
-    const qp_share_part *part = &job->parts[n == 1 ? first : first + quarters[side.index][0]];
-    *sample = part->out + part->rim->corner[side.index];
+    const qp_share_part *part = &parts[n == 1 ? 0 : quarters[side.index][0]];
+    *sample = part_sample(job, part, part->rim->corner[side.index]);
     return true;
 }
 
@@ -169,7 +209,10 @@ static void share_corner(const share_job *job, sink *s, qp_side side, const qp_c
     if (!corner_sample(job, side, &to)) return;
     for (int i = 0; i < (both ? 1 : 2); ++i) {
         if (from[i].patch == QP_NONE || from[i].patch == side.patch) continue;
-        if (!corner_sample(job, from[i], &source)) source = add_ghost(s, ghost_at_corner(from[i]));
+        if (corner_sample(job, from[i], &source))
+            source = source_of(job, s, source);
+        else
+            source = add_ghost(s, ghost_at_corner(from[i]));
         add_copy(s, to, source,
                  (uint8_t)(both     ? QP_SHARE_POSITION | QP_SHARE_NORMAL
                            : i == 0 ? QP_SHARE_POSITION
@@ -177,28 +220,47 @@ static void share_corner(const share_job *job, sink *s, qp_side side, const qp_c
     }
 }
 
-static void share_face(const share_job *job, uint32_t face, sink *s) {
-    const qp_mesh *mesh = job->share->surface->mesh;
-    const uint32_t first = mesh->patch_offsets[face];
-    for (uint32_t p = first; p < mesh->patch_offsets[face + 1]; ++p) {
-        if (job->first_part[p] == job->first_part[p + 1]) continue;
-        for (uint32_t k = 0; k < 4; ++k) {
-            const qp_side side = {p, k};
-            const qp_corner_owner corner = qp_share_corner(job->share, face, p - first, k);
-            share_corner(job, s, side, &corner);
-            const qp_edge_owner edge = qp_share_edge(job->share, face, p - first, k);
-            if (!edge.own) share_edge(job, s, side, &edge);
-        }
+/* A patch, with its face and place in it. */
+typedef struct patch_place {
+    uint32_t patch, face, child;
+} patch_place;
+
+static patch_place place_of(const qp_mesh *mesh, uint32_t patch) {
+    patch_place at = {.patch = patch};
+    at.face = qp_patch_face(mesh, patch, &at.child);
+    return at;
+}
+static void go_on(const qp_mesh *mesh, patch_place *at) {
+    ++at->patch;
+    ++at->child;
+    while (at->face + 1 < mesh->n_faces && mesh->patch_offsets[at->face + 1] <= at->patch) {
+        ++at->face;
+        at->child = 0;
+    }
+}
+
+static void share_patch(const share_job *job, const patch_place *at, sink *s) {
+    for (uint32_t k = 0; k < 4; ++k) {
+        const qp_side side = {at->patch, k};
+        const qp_corner_owner corner = qp_share_corner(job->share, at->face, at->child, k);
+        share_corner(job, s, side, &corner);
+        const qp_edge_owner edge = qp_share_edge(job->share, at->face, at->child, k);
+        if (!edge.own) share_edge(job, s, side, &edge);
     }
 }
 
 static void share_blocks(void *context, size_t begin, size_t end, unsigned worker) {
     const share_job *job = context;
-    const uint32_t n_faces = job->share->surface->mesh->n_faces;
+    const qp_share_parts *parts = job->parts;
+    const qp_mesh *mesh = job->share->surface->mesh;
     (void)worker;
     for (size_t b = begin; b < end; ++b) {
-        const uint32_t first = (uint32_t)b * BLOCK, count = n_faces - first < BLOCK ? n_faces - first : BLOCK;
-        for (uint32_t i = 0; i < count; ++i) share_face(job, first + i, &job->sinks[b]);
+        const uint32_t first = (uint32_t)b * job->block, left = parts->end - parts->first - first;
+        patch_place at = place_of(mesh, parts->first + first);
+        for (uint32_t i = 0; i < (left < job->block ? left : job->block); ++i, go_on(mesh, &at)) {
+            if (parts->first_part[first + i] != parts->first_part[first + i + 1])
+                share_patch(job, &at, &job->sinks[b]);
+        }
     }
 }
 
@@ -233,12 +295,15 @@ static qp_status join_sinks(const sink *sinks, size_t n_sinks, qp_copies *copies
     return QP_OK;
 }
 
-qp_status qp_share_tessellation(const qp_share *share, const uint64_t *first_part, const qp_share_part *parts,
-                                qp_copies *copies, qp_ghosts *ghosts, qp_error *err) {
-    const size_t n_sinks = ((size_t)share->surface->mesh->n_faces + BLOCK - 1) / BLOCK;
-    share_job job = {share, first_part, parts, qp_alloc(n_sinks, sizeof *job.sinks, true)};
+qp_status qp_share_tessellation(const qp_share *share, const qp_share_parts *parts, qp_copies *copies,
+                                qp_ghosts *ghosts, qp_error *err) {
+    const uint32_t n = parts->end - parts->first;
+    /* Few patches go to all threads as well. */
+    share_job job = {share, parts, n > 4096 ? 256 : n / 16 + 1, NULL};
+    const size_t n_sinks = ((size_t)n + job.block - 1) / job.block;
     *copies = (qp_copies){0};
     *ghosts = (qp_ghosts){0};
+    job.sinks = qp_alloc(n_sinks, sizeof *job.sinks, true);
     if (job.sinks == NULL) return qp_fail_memory(err, n_sinks * sizeof *job.sinks, "shared samples");
     qp_parallel(n_sinks, 1, share_blocks, &job);
     qp_status status = join_sinks(job.sinks, n_sinks, copies, ghosts, err);
@@ -248,6 +313,49 @@ qp_status qp_share_tessellation(const qp_share *share, const uint64_t *first_par
     }
     free(job.sinks);
     return status;
+}
+
+/* ---- Owners outside ---- */
+
+static bool add_other(qp_patch_list *others, uint32_t first, uint32_t end, uint32_t patch) {
+    if (patch == QP_NONE || (patch >= first && patch < end)) return true;
+    /* Most of them come several times in a row. */
+    for (size_t i = others->count; i > 0 && i + 4 > others->count; --i)
+        if (others->list[i - 1] == patch) return true;
+    if (!qp_grow((void **)&others->list, &others->capacity, others->count + 1, sizeof *others->list))
+        return false;
+    others->list[others->count++] = patch;
+    return true;
+}
+
+static int by_number(const void *a, const void *b) {
+    const uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
+    return (x > y) - (x < y);
+}
+
+qp_status qp_share_others(const qp_share *share, uint32_t first, uint32_t end, qp_patch_list *others, qp_error *err) {
+    const qp_surface *surface = share->surface;
+    bool good = true;
+    others->count = 0;
+    if (first == 0 && end == surface->mesh->n_patches) return QP_OK;
+    for (patch_place at = place_of(surface->mesh, first); at.patch < end && good; go_on(surface->mesh, &at)) {
+        if (surface->patch_plan[at.patch] == QP_NONE) continue;
+        for (uint32_t k = 0; k < 4 && good; ++k) {
+            const qp_corner_owner corner = qp_share_corner(share, at.face, at.child, k);
+            const qp_edge_owner edge = qp_share_edge(share, at.face, at.child, k);
+            good = add_other(others, first, end, corner.position.patch) &&
+                   add_other(others, first, end, corner.normal.patch) &&
+                   add_other(others, first, end, edge.side[0].patch) &&
+                   (!edge.split || add_other(others, first, end, edge.side[1].patch));
+        }
+    }
+    if (!good) return qp_fail_memory(err, (others->count + 1) * sizeof *others->list, "shared samples");
+    if (others->count != 0) qsort(others->list, others->count, sizeof *others->list, by_number);
+    size_t kept = 0;
+    for (size_t i = 0; i < others->count; ++i)
+        if (i == 0 || others->list[i] != others->list[i - 1]) others->list[kept++] = others->list[i];
+    others->count = kept;
+    return QP_OK;
 }
 
 /* ---- Points ---- */

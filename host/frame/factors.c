@@ -22,11 +22,13 @@
 
 enum { FACTORS = 6 };
 
-typedef struct factor_work {
+typedef struct qp_factors {
     const qp_surface *surface;
-    const qp_tessellation *tess;
-    uint8_t *by_ngon;   /* [n_edges] an n-gon with a surface touches this edge */
-    uint8_t *quartered; /* [n_faces] */
+    qp_tessellation tess;
+    uint8_t *by_ngon;    /* [n_edges] an n-gon with a surface touches this edge; NULL with factors of patches */
+    uint8_t *quartered;  /* [n_faces], likewise */
+    uint32_t spoke_face; /* n-gon whose spokes have the factor below, or QP_NONE */
+    float spoke;
 } factor_work;
 
 static bool is_quad(const qp_mesh *mesh, uint32_t face) {
@@ -37,14 +39,14 @@ static bool has_surface(const qp_surface *surface, uint32_t face) {
 }
 
 static float edge_factor(const factor_work *w, uint32_t edge) {
-    return w->tess->edge_factors != NULL ? w->tess->edge_factors[edge] : w->tess->factor;
+    return w->tess.edge_factors != NULL ? w->tess.edge_factors[edge] : w->tess.factor;
 }
 
 /* Segments of half an edge, see above. */
 static float half_factor(const factor_work *w, uint32_t edge) {
     const float f = edge_factor(w, edge);
-    if (w->tess->spacing == QP_FRACTIONAL_ODD) return f > 2 ? f / 2 : 1;
-    float m = w->tess->spacing == QP_FRACTIONAL_EVEN ? 2 : 1;
+    if (w->tess.spacing == QP_FRACTIONAL_ODD) return f > 2 ? f / 2 : 1;
+    float m = w->tess.spacing == QP_FRACTIONAL_EVEN ? 2 : 1;
     while (m < f / 2) m *= 2;
     return m;
 }
@@ -103,7 +105,7 @@ static void quad_factors(const factor_work *w, uint32_t face, float f[FACTORS]) 
         f[outer_of_edge[i]] = w->by_ngon[edge] ? 2 * half_factor(w, edge) : edge_factor(w, edge);
     }
     set_inner(f);
-    if (w->tess->edge_factors == NULL) f[4] = f[5] = w->tess->factor;
+    if (w->tess.edge_factors == NULL) f[4] = f[5] = w->tess.factor;
 }
 
 static void quarter_factors(const factor_work *w, uint32_t face, float f[4 * FACTORS]) {
@@ -123,83 +125,63 @@ static void quarter_factors(const factor_work *w, uint32_t face, float f[4 * FAC
     }
 }
 
-/* Of all children of an n-gon, one after the other. */
-static void child_factors(const factor_work *w, uint32_t face, float *f) {
+static float spoke_factor(factor_work *w, uint32_t face) {
     const qp_mesh *mesh = w->surface->mesh;
     const uint32_t first = mesh->face_offsets[face], size = qp_face_size(mesh, face);
-    float spoke = 0;
-    for (uint32_t i = 0; i < size; ++i) spoke = larger(spoke, half_factor(w, mesh->corner_edge[first + i]));
-    for (uint32_t i = 0; i < size; ++i, f += FACTORS) {
-        f[0] = half_factor(w, mesh->corner_edge[first + (i + size - 1) % size]);
-        f[1] = half_factor(w, mesh->corner_edge[first + i]);
-        f[2] = f[3] = spoke;
-        set_inner(f);
-    }
+    if (face == w->spoke_face) return w->spoke;
+    w->spoke_face = face;
+    w->spoke = 0;
+    for (uint32_t i = 0; i < size; ++i)
+        w->spoke = larger(w->spoke, half_factor(w, mesh->corner_edge[first + i]));
+    return w->spoke;
 }
 
-/* ---- All patches ---- */
+static void child_factors(factor_work *w, uint32_t face, uint32_t child, float f[FACTORS]) {
+    const qp_mesh *mesh = w->surface->mesh;
+    const uint32_t first = mesh->face_offsets[face], size = qp_face_size(mesh, face);
+    f[0] = half_factor(w, mesh->corner_edge[first + (child + size - 1) % size]);
+    f[1] = half_factor(w, mesh->corner_edge[first + child]);
+    f[2] = f[3] = spoke_factor(w, face);
+    set_inner(f);
+}
 
 /* Written so that NaN discards. */
 static bool is_kept(const float *f) {
     return f[0] > 0 && f[1] > 0 && f[2] > 0 && f[3] > 0;
 }
 
-static qp_status alloc_parts(qp_part_factors *factors, uint32_t n_patches, qp_error *err) {
-    uint64_t parts = 0;
-    for (uint32_t p = 0; p <= n_patches; ++p) {
-        const uint64_t own = p < n_patches ? factors->first[p] : 0;
-        factors->first[p] = parts;
-        parts += own;
-    }
-    if (parts > SIZE_MAX / (FACTORS * sizeof(float)))
-        return qp_fail_memory(err, SIZE_MAX, "tessellation factors");
-    factors->values = qp_alloc((size_t)parts, FACTORS * sizeof(float), false);
-    if (factors->values == NULL)
-        return qp_fail_memory(err, (size_t)parts * FACTORS * sizeof(float), "tessellation factors");
-    return QP_OK;
-}
-
-static qp_status from_patches(const qp_surface *surface, const float *given, qp_part_factors *factors,
-                              qp_error *err) {
-    const uint32_t n = surface->mesh->n_patches;
-    for (uint32_t p = 0; p < n; ++p)
-        factors->first[p] = surface->patch_plan[p] != QP_NONE && is_kept(given + FACTORS * (size_t)p);
-    qp_status status = alloc_parts(factors, n, err);
-    for (uint32_t p = 0; p < n && status == QP_OK; ++p) {
-        float *f = factors->values + FACTORS * factors->first[p];
-        if (factors->first[p + 1] == factors->first[p]) continue;
-        memcpy(f, given + FACTORS * (size_t)p, FACTORS * sizeof *f);
+uint32_t qp_factors_of(qp_factors *w, uint32_t patch, float values[QP_FACTORS_MOST]) {
+    if (w->surface->patch_plan[patch] == QP_NONE) return 0;
+    if (w->tess.patch_factors != NULL) {
+        const float *given = w->tess.patch_factors + FACTORS * (size_t)patch;
+        if (!is_kept(given)) return 0;
+        memcpy(values, given, FACTORS * sizeof *values);
         for (int i = 4; i < FACTORS; ++i)
-            if (!(f[i] >= 1))
-                f[i] = 1; /* as the tessellator clamps; a NaN would equal nothing, not even itself */
+            if (!(values[i] >= 1))
+                values[i] = 1; /* as the tessellator clamps; a NaN would equal nothing, not even itself */
+        return 1;
     }
-    return status;
+    uint32_t child;
+    const uint32_t face = qp_patch_face(w->surface->mesh, patch, &child);
+    if (!is_quad(w->surface->mesh, face)) {
+        child_factors(w, face, child, values);
+    } else if (w->quartered[face]) {
+        quarter_factors(w, face, values);
+        return 4;
+    } else {
+        quad_factors(w, face, values);
+    }
+    return 1;
 }
 
-static qp_status from_edges(factor_work *w, qp_part_factors *factors, qp_error *err) {
+/* What factors of edges depend on. */
+static qp_status mark_edges(factor_work *w, qp_error *err) {
     const qp_mesh *mesh = w->surface->mesh;
     for (uint32_t h = 0; h < mesh->n_corners; ++h) {
         const uint32_t face = mesh->corner_face[h];
         if (!is_quad(mesh, face) && has_surface(w->surface, face)) w->by_ngon[mesh->corner_edge[h]] = 1;
     }
-    qp_status status = w->tess->spacing == QP_FRACTIONAL_ODD ? mark_quarters(w, err) : QP_OK;
-    if (status != QP_OK) return status;
-    for (uint32_t face = 0; face < mesh->n_faces; ++face) {
-        for (uint32_t p = mesh->patch_offsets[face]; p < mesh->patch_offsets[face + 1]; ++p)
-            factors->first[p] = !has_surface(w->surface, face) ? 0 : w->quartered[face] ? 4 : 1;
-    }
-    status = alloc_parts(factors, mesh->n_patches, err);
-    for (uint32_t face = 0; face < mesh->n_faces && status == QP_OK; ++face) {
-        float *f = factors->values + FACTORS * factors->first[mesh->patch_offsets[face]];
-        if (!has_surface(w->surface, face)) continue;
-        if (!is_quad(mesh, face))
-            child_factors(w, face, f);
-        else if (w->quartered[face])
-            quarter_factors(w, face, f);
-        else
-            quad_factors(w, face, f);
-    }
-    return status;
+    return w->tess.spacing == QP_FRACTIONAL_ODD ? mark_quarters(w, err) : QP_OK;
 }
 
 static qp_status check_tessellation(const qp_mesh *mesh, const qp_tessellation *tess, qp_error *err) {
@@ -218,25 +200,71 @@ static qp_status check_tessellation(const qp_mesh *mesh, const qp_tessellation *
     return QP_OK;
 }
 
-qp_status qp_factors_make(const qp_surface *surface, const qp_tessellation *tess, qp_part_factors *factors,
+qp_status qp_factors_open(const qp_surface *surface, const qp_tessellation *tess, qp_factors **factors,
                           qp_error *err) {
     const qp_mesh *mesh = surface->mesh;
-    *factors = (qp_part_factors){0};
+    *factors = NULL;
     qp_status status = check_tessellation(mesh, tess, err);
     if (status != QP_OK) return status;
-    factor_work w = {.surface = surface, .tess = tess};
-    w.by_ngon = qp_alloc(mesh->n_edges, 1, true);
-    w.quartered = qp_alloc(mesh->n_faces, 1, true);
-    factors->first = qp_alloc((size_t)mesh->n_patches + 1, sizeof *factors->first, true);
-    if (w.by_ngon == NULL || w.quartered == NULL || factors->first == NULL)
-        status =
-            qp_fail_memory(err, (size_t)mesh->n_patches * sizeof *factors->first, "tessellation factors");
-    else if (tess->patch_factors != NULL)
-        status = from_patches(surface, tess->patch_factors, factors, err);
+    factor_work *w = qp_alloc(1, sizeof *w, true);
+    if (w == NULL) return qp_fail_memory(err, sizeof *w, "tessellation factors");
+    *w = (factor_work){.surface = surface, .tess = *tess, .spoke_face = QP_NONE};
+    if (tess->patch_factors == NULL) {
+        w->by_ngon = qp_alloc(mesh->n_edges, 1, true);
+        w->quartered = qp_alloc(mesh->n_faces, 1, true);
+        if (w->by_ngon == NULL || w->quartered == NULL)
+            status = qp_fail_memory(err, (size_t)mesh->n_edges + mesh->n_faces, "tessellation factors");
+        else
+            status = mark_edges(w, err);
+    }
+    if (status == QP_OK)
+        *factors = w;
     else
-        status = from_edges(&w, factors, err);
-    free(w.by_ngon);
-    free(w.quartered);
+        qp_factors_close(w);
+    return status;
+}
+
+void qp_factors_close(qp_factors *factors) {
+    if (factors == NULL) return;
+    free(factors->by_ngon);
+    free(factors->quartered);
+    free(factors);
+}
+
+static qp_status make_all(qp_factors *w, qp_part_factors *factors, qp_error *err) {
+    const uint32_t n = w->surface->mesh->n_patches;
+    float values[QP_FACTORS_MOST];
+    uint64_t parts = 0;
+    for (uint32_t p = 0; p < n; ++p) {
+        factors->first[p] = parts;
+        parts += qp_factors_of(w, p, values);
+    }
+    factors->first[n] = parts;
+    if (parts > SIZE_MAX / (FACTORS * sizeof(float)))
+        return qp_fail_memory(err, SIZE_MAX, "tessellation factors");
+    factors->values = qp_alloc((size_t)parts, FACTORS * sizeof(float), false);
+    if (factors->values == NULL)
+        return qp_fail_memory(err, (size_t)parts * FACTORS * sizeof(float), "tessellation factors");
+    for (uint32_t p = 0; p < n; ++p) {
+        const uint32_t own = qp_factors_of(w, p, values);
+        memcpy(factors->values + FACTORS * factors->first[p], values, own * FACTORS * sizeof *values);
+    }
+    return QP_OK;
+}
+
+qp_status qp_factors_make(const qp_surface *surface, const qp_tessellation *tess, qp_part_factors *factors,
+                          qp_error *err) {
+    const size_t count = (size_t)surface->mesh->n_patches + 1;
+    qp_factors *w;
+    *factors = (qp_part_factors){0};
+    qp_status status = qp_factors_open(surface, tess, &w, err);
+    if (status != QP_OK) return status;
+    factors->first = qp_alloc(count, sizeof *factors->first, false);
+    if (factors->first == NULL)
+        status = qp_fail_memory(err, count * sizeof *factors->first, "tessellation factors");
+    else
+        status = make_all(w, factors, err);
+    qp_factors_close(w);
     if (status != QP_OK) qp_factors_free(factors);
     return status;
 }

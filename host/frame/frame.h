@@ -4,52 +4,12 @@
 
 #include "host/device/device.h"
 #include "host/frame/ring_buffer.h"
-#include "host/frame/share.h"
+#include "host/frame/layout.h"
 #include "host/frame/tolerance.h"
 #include "host/plan/plan.h"
 
 #include <float.h>
 #include <math.h>
-
-#include <math.h>
-
-/* Samples of one patch, evaluated by one work-group. */
-typedef struct qp_frame_item {
-    uint32_t patch, samples;
-    uint32_t level; /* rows[level] of the patch's plan are needed */
-    uint64_t grid;  /* first (u,v) in grid_u, grid_v */
-    uint64_t out;   /* first sample in the stream */
-} qp_frame_item;
-
-/* What to evaluate. Items are in order of .out and cover n_evaluated samples without gaps; several may share a grid, and a patch may
- * have several. Samples that are evaluated only for others to copy are no part of the stream: they lie behind its n_samples, or,
- * where there is an `order`, anywhere. */
-typedef struct qp_frame_layout {
-    size_t n_items;
-    qp_frame_item *items;
-    size_t grid_points;
-    double *grid_u, *grid_v; /* [grid_points] in [0,1], or, with the sign bit set, signed already; upload rounds and signs them */
-    uint64_t n_samples, n_triangles;
-    float *uv;              /* [2 * n_samples] */
-    uint32_t *sample_patch; /* [n_samples] */
-    uint32_t *triangles;    /* [3 * n_triangles], NULL unless asked for */
-    uint64_t *order;        /* sample i of the caller is sample order[i] of the items; NULL: the same */
-    uint64_t n_evaluated;   /* n_samples, and those that are there to be copied */
-    qp_copies copies;       /* once all are evaluated */
-} qp_frame_layout;
-
-/* The tessellator's points of every patch that has a surface; factors.h says with which factors. share: NULL for none. Errors:
- * QP_BAD_INPUT for a factor that is not in [1, 64], QP_SYSTEM for memory. */
-qp_status qp_layout_tessellate(const qp_surface *surface, const qp_tessellation *tessellation,
-                               const qp_share *share, bool want_triangles, qp_frame_layout *layout, qp_error *err);
-/* Its items alone, in order of patches, and how many samples and triangles they make; no array is filled, and no ghosts are added. */
-qp_status qp_layout_items(const qp_surface *surface, const qp_tessellation *tessellation, qp_frame_layout *layout,
-                          qp_error *err);
-/* Any points, grouped by patch. Errors: QP_BAD_INPUT names the first point that is none of a patch with a
- * surface. */
-qp_status qp_layout_points(const qp_surface *surface, uint64_t count, const uint32_t *patch, const double *uv,
-                           const qp_share *share, qp_frame_layout *layout, qp_error *err);
-void qp_layout_free(qp_frame_layout *layout);
 
 /* A run of items whose samples fit a buffer of the device, and whose control points fit the scratch buffer.
  */

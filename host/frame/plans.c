@@ -55,6 +55,7 @@ static int missing_level(const qp_frame *frame, const qp_frame_item *item) {
     const bool irregular = (plan->flags & QP_PLAN_IRREGULAR) != 0;
     const double covered = ldexp(1.0, -(int)plan->depth);
     int level = 0;
+    if (item->nearest >= covered && !irregular) return 0;
     for (uint32_t i = 0; i < item->samples; ++i) {
         double u = qp_frame_coordinate(frame, frame->layout.grid_u[item->grid + i]);
         double v = qp_frame_coordinate(frame, frame->layout.grid_v[item->grid + i]);

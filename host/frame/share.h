@@ -65,9 +65,10 @@ typedef struct qp_copies {
     qp_copy *list;
 } qp_copies;
 
-/* A sample that is evaluated for others to copy. Coordinates are signed (kernels/frame_layout.h), in double. */
+/* A sample that is evaluated for others to copy. Coordinates are in double, and may be signed (kernels/frame_layout.h). */
 typedef struct qp_ghost {
     uint32_t patch;
+    uint32_t level; /* of the patch's own samples, where this is one of them; QP_LEVELS - 1 elsewhere */
     double u, v;
 } qp_ghost;
 
@@ -78,21 +79,41 @@ typedef struct qp_ghosts {
 
 /* One part of a patch of a tessellation: the patch, or a quarter (factors.h). */
 typedef struct qp_share_part {
-    uint64_t out;    /* its first sample */
+    uint64_t out;    /* its first sample; of a patch outside the stream anything */
     const float *uv; /* of its samples, in the patch's coordinates */
     const struct qp_rim *rim;
+    uint32_t patch, level; /* the level of the patch's samples */
 } qp_share_part;
+
+/* The patches first .. end - 1, whose samples make the stream, and some others, which have none there but may own samples of it. A patch
+ * has no part, 1 or 4. */
+typedef struct qp_share_parts {
+    uint32_t first, end;
+    const size_t *first_part; /* [end - first + 1] */
+    const qp_share_part *parts;
+    size_t n_others;
+    const uint32_t *others;    /* [n_others] patches, increasing */
+    const size_t *others_part; /* [n_others + 1] */
+} qp_share_parts;
 
 /* The first `count` samples of a part run counter-clockwise around it, and these of them are its corners. */
 typedef struct qp_rim {
     uint32_t count, corner[4];
 } qp_rim;
 
-/* The copies of a tessellation. Patch p has parts first_part[p] .. first_part[p + 1] - 1: none, 1 or 4. A copy from QP_SHARE_GHOST + i
- * is from ghost i, which the caller gives a place. Errors: QP_SYSTEM for memory. */
+typedef struct qp_patch_list {
+    size_t count, capacity;
+    uint32_t *list;
+} qp_patch_list;
+
+/* The patches that own samples of patches first .. end - 1 and are none of those, increasing. Errors: QP_SYSTEM for memory. */
+qp_status qp_share_others(const qp_share *share, uint32_t first, uint32_t end, qp_patch_list *others, qp_error *err);
+
+/* The copies of a tessellation. Of every owner in it the parts must be there. Samples of others that are copied become ghosts. A copy
+ * from QP_SHARE_GHOST + i is from ghost i, which the caller gives a place. Errors: QP_SYSTEM for memory. */
 #define QP_SHARE_GHOST (UINT64_C(1) << 63)
-qp_status qp_share_tessellation(const qp_share *share, const uint64_t *first_part, const qp_share_part *parts,
-                                qp_copies *copies, qp_ghosts *ghosts, qp_error *err);
+qp_status qp_share_tessellation(const qp_share *share, const qp_share_parts *parts, qp_copies *copies,
+                                qp_ghosts *ghosts, qp_error *err);
 
 /* Appends the copies for a point of a patch at (u,v) in [0,1]^2, where it lies on the perimeter: to sample `to`, from ghosts as above. */
 qp_status qp_share_point(const qp_share *share, uint32_t patch, double u, double v, uint64_t to,
