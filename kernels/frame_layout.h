@@ -13,7 +13,9 @@
 #define QP_ENTRY_OUT 10u     /* 64 bits: first sample in the vertex buffer */
 #define QP_ENTRY_LEVEL 12u   /* the level of the tessellation, whose points are made: rows[level] */
 #define QP_ENTRY_ORIGIN 13u  /* base vertex that the patch is relative to */
+#define QP_ENTRY_NUMBERS 14u /* 64 bits: where the numbers of its points begin, or QP_NO_NUMBERS (cache_layout.h) */
 #define QP_ENTRY_WORDS 16u   /* a cache line */
+#define QP_NO_NUMBERS 0xffffffffffffffffu
 
 #define QP_ENTRY_WIDE(e, word) ((ulong)(e)[word] | (ulong)(e)[(word) + 1u] << 32)
 

@@ -23,8 +23,13 @@
 
 /* Words that work-groups share. OpenCL 1.2's atomics order nothing else: qp_release() comes after the writes of a work-item
  * that others are to see, and before the atomic that tells them; qp_acquire() after the atomic that told, and before the reads. */
+#ifdef QP_KERNEL_YIELD /* clang for this processor: its loads and stores will do */
+#define qp_atomic_load(p) __atomic_load_n((p), __ATOMIC_ACQUIRE)
+#define qp_atomic_store(p, value) __atomic_store_n((p), (value), __ATOMIC_RELEASE)
+#else
 #define qp_atomic_load(p) atomic_add((p), 0u)
 #define qp_atomic_store(p, value) ((void)atomic_xchg((p), (value)))
+#endif
 #define qp_atomic_add(p, value) atomic_add((p), (value))
 #define qp_atomic_sub(p, value) atomic_sub((p), (value))
 #define qp_atomic_max(p, value) atomic_max((p), (value))
@@ -32,6 +37,12 @@
 #define qp_atomic_swap(p, expected, value) (atomic_cmpxchg((p), (expected), (value)) == (expected))
 #define qp_release() mem_fence(CLK_GLOBAL_MEM_FENCE)
 #define qp_acquire() mem_fence(CLK_GLOBAL_MEM_FENCE)
+/* One word, whole, in no order with others but by qp_acquire and qp_release. */
+#define qp_word_load(p) (*(volatile __global const uint *)(p))
+#define qp_word_store(p, value) ((void)(*(volatile __global uint *)(p) = (value)))
+/* A word of local memory, to tell or count among the items of a group. */
+#define qp_local_add(p, value) atomic_add((p), (value))
+#define qp_popcount(x) popcount(x)
 /* Once a round while an item waits for others. Where kernels run on Linux as code of the processor's own (QP_KERNEL_YIELD: 24 is
  * sched_yield), the thread makes room, for the one that is waited for may have been put aside in its favour. */
 #ifdef QP_KERNEL_YIELD
@@ -78,6 +89,10 @@ QP_FUNCTION void qp_wait(void) {
 #define qp_atomic_swap(p, expected, value) qp_host_atomic_swap((p), (expected), (value))
 #define qp_release() ((void)0)
 #define qp_acquire() ((void)0)
+#define qp_word_load(p) __atomic_load_n((p), __ATOMIC_ACQUIRE)
+#define qp_word_store(p, value) __atomic_store_n((p), (value), __ATOMIC_RELEASE)
+#define qp_local_add(p, value) (*(p) += (value))
+#define qp_popcount(x) ((uint32_t)__builtin_popcount(x))
 /* host_kernels.c */
 void qp_host_wait(void);
 uint64_t qp_host_clock(void);

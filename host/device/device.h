@@ -72,6 +72,8 @@ typedef enum qp_kernel_id {
     QP_KERNEL_FUSED,
     QP_KERNEL_STREAM_HULL,
     QP_KERNEL_STREAM_DOMAIN,
+    QP_KERNEL_CACHED_HULL,
+    QP_KERNEL_CACHE_FORGET,
     QP_KERNELS
 } qp_kernel_id;
 

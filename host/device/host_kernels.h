@@ -15,7 +15,7 @@ typedef void (*qp_host_kernel)(const qp_host_arg *args, size_t group);
 
 /* One entry a qp_kernel_id (device.h). */
 typedef struct qp_host_kernels {
-    qp_host_kernel hull, domain, regular, fused, stream_hull, stream_domain;
+    qp_host_kernel hull, domain, regular, fused, stream_hull, stream_domain, cached_hull, cache_forget;
 } qp_host_kernels;
 
 /* The best build of the kernels for this processor. All builds give the same bits. */

@@ -11,7 +11,9 @@ enum { MAX_ARGS = 24 };
  * other, see docs/same-bits.md). No number changes a bit of the stream. */
 static size_t group_items(const qp_device *device, qp_kernel_id kernel) {
     if (device->items != 0) return device->items;
-    return kernel == QP_KERNEL_HULL || kernel == QP_KERNEL_STREAM_HULL || !device->info.is_cpu ? 32 : 1;
+    const bool hull = kernel == QP_KERNEL_HULL || kernel == QP_KERNEL_STREAM_HULL ||
+                      kernel == QP_KERNEL_CACHED_HULL || kernel == QP_KERNEL_CACHE_FORGET;
+    return hull || !device->info.is_cpu ? 32 : 1;
 }
 
 typedef struct host_launch {
@@ -33,7 +35,9 @@ static void launch_host(const qp_program *program, qp_kernel_id kernel, const qp
                                                 [QP_KERNEL_REGULAR] = all->regular,
                                                 [QP_KERNEL_FUSED] = all->fused,
                                                 [QP_KERNEL_STREAM_HULL] = all->stream_hull,
-                                                [QP_KERNEL_STREAM_DOMAIN] = all->stream_domain};
+                                                [QP_KERNEL_STREAM_DOMAIN] = all->stream_domain,
+                                                [QP_KERNEL_CACHED_HULL] = all->cached_hull,
+                                                [QP_KERNEL_CACHE_FORGET] = all->cache_forget};
     host_launch launch = {.kernel = kernels[kernel]};
     for (uint32_t i = 0; i < n_args; ++i) {
         launch.args[i].memory = args[i].buffer != NULL ? args[i].buffer->host : NULL;

@@ -9,10 +9,10 @@
 #include <string.h>
 
 static const char *const shared_sources[] = {"portable.h", "plan_layout.h", "frame_layout.h",
-                                             "ring_layout.h", "ring.h", "real.h",
+                                             "ring_layout.h", "ring.h", "cache_layout.h", "real.h",
                                              "spline.h"};
 enum { SHARED_SOURCES = sizeof shared_sources / sizeof shared_sources[0] };
-/* parts: kernels (1 << qp_kernel_id) whose files it calls functions of. */
+/* parts: kernels (1 << qp_kernel_id) whose files it calls functions of, or is in. */
 static const struct {
     const char *kernel, *file;
     unsigned parts;
@@ -23,6 +23,8 @@ static const struct {
     [QP_KERNEL_FUSED] = {"fused", "fused.cl", 1u << QP_KERNEL_HULL | 1u << QP_KERNEL_DOMAIN},
     [QP_KERNEL_STREAM_HULL] = {"stream_hull", "stream_hull.cl", 1u << QP_KERNEL_HULL},
     [QP_KERNEL_STREAM_DOMAIN] = {"stream_domain", "stream_domain.cl", 1u << QP_KERNEL_DOMAIN},
+    [QP_KERNEL_CACHED_HULL] = {"cached_hull", "cached_hull.cl", 1u << QP_KERNEL_HULL},
+    [QP_KERNEL_CACHE_FORGET] = {"cache_forget", NULL, 1u << QP_KERNEL_CACHED_HULL | 1u << QP_KERNEL_HULL},
 };
 
 /* One source file, malloced with a NUL: from the folder when it is given, else from the library. */
@@ -132,7 +134,8 @@ qp_status qp_program_build(qp_device *device, qp_precision precision, unsigned k
     unsigned files = kernels;
     for (int k = 0; k < QP_KERNELS; ++k) files |= (kernels & 1u << k) != 0 ? stages[k].parts : 0u;
     for (int k = 0; k < QP_KERNELS && status == QP_OK; ++k) {
-        if ((files & 1u << k) != 0) status = load_source(folder, stages[k].file, &texts[n++], err);
+        if ((files & 1u << k) != 0 && stages[k].file != NULL)
+            status = load_source(folder, stages[k].file, &texts[n++], err);
     }
     if (status == QP_OK) {
         char options[512];

@@ -30,6 +30,7 @@ static void write_entry(const qp_frame *frame, const qp_frame_item *item, const 
     put_wide(entry + QP_ENTRY_SUPPORT, support);
     put_wide(entry + QP_ENTRY_GRID, item->grid);
     put_wide(entry + QP_ENTRY_OUT, item->out - batch->first_sample);
+    if (qp_frame_is_cached(frame)) put_wide(entry + QP_ENTRY_NUMBERS, qp_cache_first(frame, item->patch));
 }
 
 /* Appends the batch that starts at item `begin`; *end is the first item it leaves out. */

@@ -38,7 +38,10 @@ qp_status qp_frame_update_positions(qp_frame *frame, qp_error *err) {
     for (size_t i = 0; i < count; ++i)
         put_real(frame, local, QP_POSITION_FIRST + i,
                  ldexp(mesh->positions[i] - f.centre[i % 3], -f.exponent));
-    qp_status status = qp_frame_upload(frame, &frame->positions, local, reals * frame->real_size, "positions", err);
+    qp_status status = QP_OK;
+    if (qp_frame_is_cached(frame)) status = qp_cache_move(frame, local, reals * frame->real_size, err);
+    if (status == QP_OK)
+        status = qp_frame_upload(frame, &frame->positions, local, reals * frame->real_size, "positions", err);
     free(local);
     if (has_tolerance(&frame->tessellation)) frame->tessellated = false;
     free(frame->light);
@@ -76,6 +79,7 @@ void qp_frame_free(qp_frame *frame) {
                                   &frame->grid_u, &frame->grid_v,    &frame->support};
     for (size_t i = 0; i < sizeof buffers / sizeof buffers[0]; ++i) qp_buffer_free(frame->device, buffers[i]);
     qp_ring_free(frame);
+    qp_cache_free(frame);
     qp_program_free(&frame->program);
     qp_frame_drop_deep(frame);
     free(frame->patch_factors);
@@ -91,8 +95,8 @@ void qp_frame_free(qp_frame *frame) {
 /* Starts the kernels of every batch. */
 static qp_status launch_batches(qp_frame *frame, double *hull_ms, double *domain_ms, qp_error *err) {
     const uint32_t want = frame->options.want_derivatives != 0;
-    const bool fused = qp_frame_is_fused(frame);
-    qp_status status = fused ? qp_ring_reset(frame, err) : QP_OK;
+    const bool fused = qp_frame_is_fused(frame), cached = qp_frame_is_cached(frame);
+    qp_status status = fused ? qp_ring_reset(frame, err) : cached ? qp_cache_begin(frame, err) : QP_OK;
     for (size_t b = 0; b < frame->n_batches && status == QP_OK; ++b) {
         qp_frame_batch *batch = &frame->batches[b];
         status = qp_buffer_unmap(frame->device, &batch->vertices, err);
@@ -114,7 +118,8 @@ static qp_status launch_batches(qp_frame *frame, double *hull_ms, double *domain
                                   {&batch->vertices, 0}, {&batch->flags, 0},
                                   {derivatives, 0},      {NULL, want}};
         if (status == QP_OK && fused) status = qp_ring_launch(frame, b, domain_ms, err);
-        if (status == QP_OK && !fused)
+        if (status == QP_OK && cached) status = qp_cache_launch(frame, batch, hull_ms, err);
+        if (status == QP_OK && !fused && !cached)
             status = qp_launch(frame->device, &frame->program, QP_KERNEL_HULL, hull,
                                sizeof hull / sizeof hull[0], batch->n_general, hull_ms, err);
         if (status == QP_OK && !fused)
@@ -206,6 +211,8 @@ static qp_status evaluate(qp_frame *frame, qp_stream *stream, qp_error *err) {
             status = qp_buffer_map(frame->device, &frame->batches[b].derivatives, err);
     }
     if (status == QP_OK && qp_frame_is_fused(frame)) status = qp_ring_report(frame, stream, err);
+    if (status == QP_OK && qp_frame_is_cached(frame)) status = qp_cache_report(frame, &stream->supports, err);
+    if (status != QP_OK) qp_cache_distrust(frame);
     if (status == QP_OK) qp_copies_apply(&layout->copies, frame->real_size, frame->vertices, frame->flags);
     if (status == QP_OK && layout->order != NULL) {
         order_job job = {frame, sample_bytes};

@@ -3,6 +3,7 @@
 #define QP_FRAME_FRAME_H
 
 #include "host/device/device.h"
+#include "host/frame/cache.h"
 #include "host/frame/ring_buffer.h"
 #include "host/frame/layout.h"
 #include "host/frame/tolerance.h"
@@ -43,6 +44,7 @@ struct qp_frame {
     double light_bound; /* of their errors, of the diagonal */
     qp_buffer entries, grid_u, grid_v, support;      /* of the layout */
     qp_ring_buffer ring;                             /* in place of support, where the frame is fused */
+    qp_cache cache;                                  /* with supports of that kind */
 
     qp_frame_layout layout;
     bool tessellated; /* layout is of the tessellation below, and everything is uploaded */
@@ -88,8 +90,9 @@ qp_status qp_frame_grow_step(qp_frame *frame, uint8_t step, bool *changed, qp_er
 qp_status qp_frame_choose_light(qp_frame *frame, bool *changed, qp_error *err);
 void qp_frame_drop_deep(qp_frame *frame);
 /* rings.c: the 1-rings on the device. */
+/* The words go to *words as well, malloced. */
 qp_status qp_frame_upload_rings(qp_frame *frame, const qp_surface *const *surfaces, uint32_t n_surfaces,
-                                qp_error *err);
+                                uint32_t **words, qp_error *err);
 /* Base vertex that a patch is relative to: what its plan's base is anchored to. */
 uint32_t qp_frame_origin(const qp_surface *surface, uint32_t patch);
 /* First word of a patch of a surface there, and the words of all (QP_RING_WORDS). */

@@ -175,7 +175,9 @@ static qp_status build_kernels(qp_frame *frame, qp_error *err) {
                 kernels |= 1u << QP_KERNEL_REGULAR;
             } else {
                 kernels |= qp_frame_is_fused(frame) ? 1u << QP_KERNEL_FUSED
-                                                    : 1u << QP_KERNEL_HULL | 1u << QP_KERNEL_DOMAIN;
+                           : qp_frame_is_cached(frame)
+                               ? 1u << QP_KERNEL_CACHED_HULL | 1u << QP_KERNEL_CACHE_FORGET | 1u << QP_KERNEL_DOMAIN
+                               : 1u << QP_KERNEL_HULL | 1u << QP_KERNEL_DOMAIN;
                 flags |= surface->plans[surface->patch_plan[p]]->flags;
             }
         }
@@ -225,8 +227,11 @@ qp_status qp_frame_upload_plans(qp_frame *frame, qp_error *err) {
             free(padded);
         }
     }
-    if (status == QP_OK) status = qp_frame_upload_rings(frame, surfaces, n_surfaces, err);
+    uint32_t *rings = NULL;
+    if (status == QP_OK) status = qp_frame_upload_rings(frame, surfaces, n_surfaces, &rings, err);
+    if (status == QP_OK && qp_frame_is_cached(frame)) status = qp_cache_number(frame, &pack, &rings, err);
     frame->plans_uploaded = status == QP_OK;
+    free(rings);
     free(pack.heads);
     free(pack.tree);
     free(pack.reals);

@@ -116,10 +116,10 @@ static void write_faces(void *context, size_t begin, size_t end, unsigned worker
 }
 
 qp_status qp_frame_upload_rings(qp_frame *frame, const qp_surface *const *surfaces, uint32_t n_surfaces,
-                                qp_error *err) {
+                                uint32_t **kept, qp_error *err) {
     uint64_t count = 0, at = 0;
     for (uint32_t s = 0; s < n_surfaces; ++s) count += qp_frame_ring_words(surfaces[s]);
-    uint32_t *words = qp_alloc((size_t)count, sizeof *words, false);
+    uint32_t *words = *kept = qp_alloc((size_t)count, sizeof *words, false);
     if (words == NULL) return qp_fail_memory(err, (size_t)count * sizeof *words, "1-rings");
     bool failed = false;
     for (uint32_t s = 0; s < n_surfaces && !failed; at += qp_frame_ring_words(surfaces[s++])) {
@@ -130,7 +130,6 @@ qp_status qp_frame_upload_rings(qp_frame *frame, const qp_surface *const *surfac
     qp_status status =
         failed ? qp_fail_memory(err, (size_t)count * sizeof *words, "1-rings")
                : qp_frame_upload(frame, &frame->rings, words, (size_t)count * sizeof *words, "1-rings", err);
-    free(words);
     return status;
 }
 
