@@ -12,7 +12,7 @@ typedef struct cli_command {
 } cli_command;
 
 extern const cli_command cli_watertight, cli_info, cli_gen, cli_eval, cli_error, cli_sample, cli_stress,
-    cli_render, cli_devices, cli_bench;
+    cli_render, cli_devices, cli_bench, cli_ring, cli_cache;
 /* Of `bench`; its name is "bench NAME". */
 extern const cli_command cli_error_time;
 

@@ -1,76 +1,8 @@
 /* quadplan bench error-time: run time against error, of every configuration and of the peers. */
-#define _GNU_SOURCE
 #include "host/cli/error_time.h"
-#include "host/base/output.h"
+#include "host/cli/report.h"
 
-#include <errno.h>
 #include <stdlib.h>
-#include <string.h>
-#include <strings.h>
-#include <unistd.h>
-
-typedef void writer(const et_run *run, FILE *file);
-
-static qp_status write_file(const et_run *run, const char *path, writer *write, qp_error *err) {
-    qp_output output;
-    qp_status status = qp_output_open(&output, path, err);
-    if (status != QP_OK) return status;
-    write(run, output.file);
-    return qp_output_commit(&output, err);
-}
-
-/* The chart is drawn from JSON: from the file that was asked for, or from one that is removed again. */
-static qp_status draw(const et_run *run, const char *json, const char *chart, qp_error *err) {
-    if (json != NULL && strcmp(json, "-") != 0) return et_draw_chart(json, chart, err);
-    const char *folder = getenv("TMPDIR");
-    char path[4096];
-    snprintf(path, sizeof path, "%s/quadplan-XXXXXX", folder != NULL && folder[0] != '\0' ? folder : "/tmp");
-    const int descriptor = mkstemp(path);
-    FILE *file = descriptor < 0 ? NULL : fdopen(descriptor, "w");
-    if (file == NULL) return qp_fail(err, QP_SYSTEM, "%s: %s", path, strerror(errno));
-    et_write_json(run, file);
-    const bool written = ferror(file) == 0;
-    qp_status status = QP_OK;
-    if (fclose(file) != 0 || !written)
-        status = qp_fail(err, QP_SYSTEM, "%s: cannot be written", path);
-    else
-        status = et_draw_chart(path, chart, err);
-    unlink(path);
-    return status;
-}
-
-static bool ends_in(const char *path, const char *extension) {
-    const char *dot = strrchr(path, '.');
-    return dot != NULL && strcasecmp(dot, extension) == 0;
-}
-
-static qp_status report(et_run *run, qp_error *err) {
-    const et_options *o = run->options;
-    const bool json_to_stdout = o->json != NULL && strcmp(o->json, "-") == 0;
-    qp_status status = QP_OK;
-    et_mark_fronts(run);
-    if (json_to_stdout)
-        et_write_json(run, stdout);
-    else
-        et_print_table(run, stdout);
-    if (o->json != NULL && !json_to_stdout) status = write_file(run, o->json, et_write_json, err);
-    if (status == QP_OK && o->csv != NULL) status = write_file(run, o->csv, et_write_csv, err);
-    if (status == QP_OK && o->chart != NULL) status = draw(run, o->json, o->chart, err);
-    return status;
-}
-
-/* That results can be kept is found out before the run, not after it. */
-static qp_status check_outputs(const et_options *o, qp_error *err) {
-    const char *const files[] = {o->json, o->csv, o->chart};
-    for (size_t i = 0; i < sizeof files / sizeof *files; ++i) {
-        if (files[i] == NULL || strcmp(files[i], "-") == 0) continue;
-        qp_output output;
-        qp_status status = qp_output_open(&output, files[i], err);
-        if (status != QP_OK) return status;
-        qp_output_abandon(&output);
-    }
-    return o->chart != NULL ? et_draw_chart(NULL, o->chart, err) : QP_OK;
-}
 
 static qp_status run_error_time(int argc, char **argv, qp_error *err) {
     et_options o = {
@@ -107,15 +39,18 @@ static qp_status run_error_time(int argc, char **argv, qp_error *err) {
     cli_arguments arguments;
     qp_status status = cli_parse(&cli_error_time, options, argc, argv, 1, &arguments, err);
     if (status != QP_OK || arguments.help) return status;
-    if (o.chart != NULL && !ends_in(o.chart, ".png") && !ends_in(o.chart, ".svg"))
-        return qp_fail(err, QP_BAD_INPUT, "%s: a chart must be named .png or .svg", o.chart);
     o.processor_time = clock == 1;
-    status = check_outputs(&o, err);
+    const cli_report report = {o.json,         o.csv,         o.chart,     "plot_error_time.py",
+                               et_print_table, et_write_json, et_write_csv};
+    status = cli_report_check(&report, err);
     if (status != QP_OK) return status;
     et_run *run = qp_alloc(1, sizeof *run, true);
     if (run == NULL) return qp_fail_memory(err, sizeof *run, "the benchmark");
     status = et_measure(run, arguments.values[0], &o, err);
-    if (status == QP_OK) status = report(run, err);
+    if (status == QP_OK) {
+        et_mark_fronts(run);
+        status = cli_report_write(&report, run, err);
+    }
     et_free(run);
     free(run);
     return status;

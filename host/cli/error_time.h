@@ -104,10 +104,9 @@ void et_free_known(et_run *run);
 /* ---- error_time_out.c ---- */
 /* Marks the fronts and the ratios, once all is measured. */
 void et_mark_fronts(et_run *run);
-void et_print_table(const et_run *run, FILE *file);
-void et_write_json(const et_run *run, FILE *file);
-void et_write_csv(const et_run *run, FILE *file);
-/* Calls the plotting script on a JSON file; without one it only finds out whether it could. */
-qp_status et_draw_chart(const char *json_path, const char *chart_path, qp_error *err);
+/* Of an et_run. */
+void et_print_table(const void *run, FILE *file);
+void et_write_json(const void *run, FILE *file);
+void et_write_csv(const void *run, FILE *file);
 
 #endif

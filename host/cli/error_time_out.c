@@ -1,13 +1,8 @@
-/* What `bench error-time` found: fronts, and the table, JSON, CSV and chart of it. */
-#define _GNU_SOURCE
-#include "host/base/embedded.h"
+/* What `bench error-time` found: fronts, and the table, JSON and CSV of it. */
 #include "host/cli/error_time.h"
 
-#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 static bool is_finite(const et_configuration *c) {
     return c->measured && c->nonfinite == 0;
@@ -65,7 +60,8 @@ static void print_variant(const et_configuration *c, char text[16]) {
     if (c->series != NULL) text[0] = '\0';
 }
 
-void et_print_table(const et_run *run, FILE *file) {
+void et_print_table(const void *result, FILE *file) {
+    const et_run *run = result;
     fprintf(file,
             "%s: %llu samples, %llu a patch; medians of %llu; %u threads, %s; quadplan on %s\n"
             "without: C crease nodes, T terminal nodes, E exact tail; t: tolerance. * on the front; ! a peer "
@@ -160,7 +156,8 @@ static const char *base_name(const char *path) {
     return slash != NULL ? slash + 1 : path;
 }
 
-void et_write_json(const et_run *run, FILE *file) {
+void et_write_json(const void *result, FILE *file) {
+    const et_run *run = result;
     qp_json json;
     qp_json_begin(&json, file);
     qp_json_text(&json, "mesh", base_name(run->mesh_name));
@@ -193,7 +190,8 @@ void et_write_json(const et_run *run, FILE *file) {
     qp_json_finish(&json);
 }
 
-void et_write_csv(const et_run *run, FILE *file) {
+void et_write_csv(const void *result, FILE *file) {
+    const et_run *run = result;
     fputs("series,library,precision,level,crease_nodes,terminal_nodes,exact_tail,tolerance,threads,ns_per_"
           "sample,setup_"
           "ms,locate_ms,"
@@ -211,35 +209,4 @@ void et_write_csv(const et_run *run, FILE *file) {
         if (c->ratio > 0) fprintf(file, "%.6g", c->ratio);
         fputc('\n', file);
     }
-}
-
-/* Exit codes of the script, beside its own. */
-enum { NO_MATPLOTLIB = 4, NO_PYTHON = 127 };
-
-/* Runs the script; its exit code. */
-static int run_script(const char *python, const char *json_path, const char *chart_path) {
-    const pid_t child = fork();
-    if (child == 0) {
-        execlp(python, python, "-c", (const char *)qp_embedded_scripts[0].bytes,
-               json_path != NULL ? json_path : "--check", chart_path, (char *)NULL);
-        _exit(NO_PYTHON);
-    }
-    int state;
-    while (child < 0 || waitpid(child, &state, 0) < 0)
-        if (child < 0 || errno != EINTR) return -1;
-    return WIFEXITED(state) ? WEXITSTATUS(state) : -1;
-}
-
-qp_status et_draw_chart(const char *json_path, const char *chart_path, qp_error *err) {
-    int code = run_script("python3", json_path, chart_path);
-    /* The system's packages belong to the system's python3, which need not be the first one of the path. */
-    if (code == NO_MATPLOTLIB) code = run_script("/usr/bin/python3", json_path, chart_path);
-    if (code == 0) return QP_OK;
-    if (code == NO_PYTHON)
-        return qp_fail(err, QP_SYSTEM, "%s: charts are drawn by python3, which is missing", chart_path);
-    if (code == NO_MATPLOTLIB)
-        return qp_fail(err, QP_SYSTEM,
-                       "%s: charts are drawn by matplotlib, which is missing (Debian: python3-matplotlib)",
-                       chart_path);
-    return qp_fail(err, QP_SYSTEM, "%s: the chart could not be drawn", chart_path);
 }

@@ -6,8 +6,8 @@
 
 static const cli_command *const commands[] = {&cli_info,   &cli_gen,        &cli_eval,
                                               &cli_error,  &cli_watertight, &cli_sample,
-                                              &cli_stress, &cli_render,     &cli_devices,
-                                              &cli_bench};
+                                              &cli_stress, &cli_render,     &cli_ring,
+                                              &cli_devices, &cli_bench};
 enum { N_COMMANDS = sizeof commands / sizeof commands[0] };
 
 static void usage(FILE *file) {
