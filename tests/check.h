@@ -54,6 +54,11 @@ static inline const char *check_models(void) {
     const char *folder = getenv("QUADPLAN_MODELS");
     return folder != NULL && folder[0] != '\0' ? folder : NULL;
 }
+/* Whether to take the counts that the issues ask for, in minutes, rather than those of every day. */
+static inline int check_full(void) {
+    const char *full = getenv("QUADPLAN_FULL");
+    return full != NULL && full[0] == '1';
+}
 /* `return check_skip_models();` from a main that cannot go on without them. */
 static inline int check_skip_models(void) {
     printf("skipped: QUADPLAN_MODELS not set\n");

@@ -37,8 +37,9 @@ static void print_json(const char *name, const char *set, const cli_evaluation *
     print_place(&json, "worst_normal", r->worst_normal_patch, r->worst_normal_u, r->worst_normal_v);
     qp_json_integer(&json, "nonfinite", r->nonfinite);
     qp_json_integer(&json, "normals_undefined", r->normals_undefined);
-    qp_json_integer(&json, "normals_parallel", r->normals_parallel);
-    qp_json_real(&json, "parallel_normal_max_deg", r->parallel_normal_max_deg);
+    qp_json_integer(&json, "normals_ill", r->normals_ill);
+    qp_json_real(&json, "ill_normal_max_deg", r->ill_normal_max_deg);
+    qp_json_real(&json, "ill_normal_deg_per_condition", r->ill_normal_deg_per_condition);
     qp_json_integer(&json, "past_depth", r->past_depth);
     qp_json_real(&json, "past_position_max", r->past_position_max);
     qp_json_real(&json, "past_normal_max_deg", r->past_normal_max_deg);
@@ -55,8 +56,9 @@ static void print_text(const char *name, const char *set, const cli_evaluation *
     printf("  normal    max %.3e  rms %.3e  degrees; worst at patch %" PRIu32 " (%.9g, %.9g)\n",
            r->normal_max_deg, r->normal_rms_deg, r->worst_normal_patch, r->worst_normal_u, r->worst_normal_v);
     printf("  %" PRIu64 " not finite, %" PRIu64 " without a normal\n", r->nonfinite, r->normals_undefined);
-    printf("  %" PRIu64 " with almost parallel tangents (sine < 0.01), left out above: normal max %.3e\n",
-           r->normals_parallel, r->parallel_normal_max_deg);
+    printf("  %" PRIu64 " whose tangents have a condition above %d, left out above: normal max %.3e, over "
+                        "the condition %.3e\n",
+           r->normals_ill, (int)QP_WELL_CONDITIONED, r->ill_normal_max_deg, r->ill_normal_deg_per_condition);
     printf("  %" PRIu64 " past the plans' depth, left out above: position max %.3e, normal max %.3e\n",
            r->past_depth, r->past_position_max, r->past_normal_max_deg);
 }
@@ -132,9 +134,9 @@ static qp_status run(int argc, char **argv, qp_error *err) {
     return status;
 }
 
-const cli_command cli_error = {
-    "error", "MESH", "Compares the vertex stream of a mesh with the exact limit surface.",
-    CLI_MESH_HELP
-    "\nPosition errors are relative to the diagonal of the mesh's bounding box. Below --depth, deeper plans are made on\n"
-    "demand, so that it changes time and memory, not errors.",
-    run};
+const cli_command cli_error = {"error", "MESH",
+                               "Compares the vertex stream of a mesh with the exact limit surface.",
+                               CLI_MESH_HELP "\nPosition errors are relative to the diagonal of the mesh's "
+                                             "bounding box. Below --depth, deeper plans are made on\n"
+                                             "demand, so that it changes time and memory, not errors.",
+                               run};

@@ -66,7 +66,7 @@ typedef struct et_run {
     double *uv;
     float *peer_uv;
     qp_peer_task task;
-    uint64_t normals_undefined, normals_parallel; /* samples that normal errors leave out */
+    uint64_t normals_undefined, normals_ill; /* samples that normal errors leave out */
     struct et_known *known;                       /* the reference's samples, by the positions it was given */
     struct et_surface *surfaces;
     size_t n_configurations, capacity;

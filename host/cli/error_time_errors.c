@@ -113,7 +113,7 @@ static qp_status measure(et_run *run, et_configuration *c, qp_stream stream, int
     c->nonfinite = report.nonfinite;
     c->measured = true;
     run->normals_undefined = report.normals_undefined;
-    run->normals_parallel = report.normals_parallel;
+    run->normals_ill = report.normals_ill;
     return QP_OK;
 }
 

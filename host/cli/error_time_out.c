@@ -171,7 +171,7 @@ void et_write_json(const void *result, FILE *file) {
     qp_json_text(&json, "clock", run->options->processor_time ? "processor" : "wall");
     qp_json_text(&json, "device", qp_device_name(run->device));
     qp_json_integer(&json, "normals_undefined", run->normals_undefined);
-    qp_json_integer(&json, "normals_parallel", run->normals_parallel);
+    qp_json_integer(&json, "normals_ill", run->normals_ill);
     qp_json_integer(&json, "peers_beyond_front", count_beating(run));
     qp_json_open_array(&json, "configurations");
     for (size_t i = 0; i < run->n_configurations; ++i) {

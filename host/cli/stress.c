@@ -266,6 +266,6 @@ const cli_command cli_stress = {
     "where a unit in the last place of every coordinate turns it by no more than 1e-3 degrees (double: "
     "1e-11) and its "
     "tangents\n"
-    "are not almost parallel. Below each family stands the command of its worst sample. Exit 1 when one is "
+    "have a condition number of 100 at the most. Below each family stands the command of its worst sample. Exit 1 when one is "
     "not finite.",
     run};

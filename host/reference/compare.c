@@ -69,11 +69,10 @@ static void measure_normal(const double *n, const qp_reference_sample *ref, uint
         r->past_normal_max_deg = fmax(r->past_normal_max_deg, degrees);
         return;
     }
-    /* The angle's error is the tangents' own, over their sine. Where they are almost parallel even the rounding of
-     * the positions that came in turns the normal, so such samples say nothing about the evaluation. */
-    if (ref->sine < 0.01) {
-        r->normals_parallel++;
-        r->parallel_normal_max_deg = fmax(r->parallel_normal_max_deg, degrees);
+    if (ref->condition > QP_WELL_CONDITIONED) {
+        r->normals_ill++;
+        r->ill_normal_max_deg = fmax(r->ill_normal_max_deg, degrees);
+        r->ill_normal_deg_per_condition = fmax(r->ill_normal_deg_per_condition, degrees / ref->condition);
         return;
     }
     r->normal_rms_deg += degrees * degrees;
@@ -168,8 +167,10 @@ static void add_partial(qp_error_report *sum, const qp_error_report *r) {
     sum->past_depth += r->past_depth;
     sum->normals_undefined += r->normals_undefined;
     sum->nonfinite += r->nonfinite;
-    sum->normals_parallel += r->normals_parallel;
-    sum->parallel_normal_max_deg = fmax(sum->parallel_normal_max_deg, r->parallel_normal_max_deg);
+    sum->normals_ill += r->normals_ill;
+    sum->ill_normal_max_deg = fmax(sum->ill_normal_max_deg, r->ill_normal_max_deg);
+    sum->ill_normal_deg_per_condition =
+        fmax(sum->ill_normal_deg_per_condition, r->ill_normal_deg_per_condition);
     sum->position_rms += r->position_rms;
     sum->normal_rms_deg += r->normal_rms_deg;
     sum->past_position_max = fmax(sum->past_position_max, r->past_position_max);

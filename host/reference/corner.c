@@ -117,6 +117,8 @@ static qp_status gather_sector(const qp_piece *m, uint32_t corner, qp_corner_wor
 static void span_plane(const sector *s, const qp_quad a[3], const qp_quad b[3], long double theta,
                        qp_corner_limit *limit) {
     for (int c = 0; c < 3; ++c) {
+        limit->a[c] = (double)a[c];
+        limit->b[c] = (double)b[c];
         limit->toward_next[c] = (double)(cosl(s->here * theta) * a[c] + sinl(s->here * theta) * b[c]);
         limit->toward_prev[c] =
             (double)(cosl((s->here + 1) * theta) * a[c] + sinl((s->here + 1) * theta) * b[c]);
@@ -188,8 +190,8 @@ static void corner_limit(const sector *s, qp_corner_limit *limit) {
     /* Wider sectors, and fans with a sharp apex, shrink onto one direction: no tangent plane. */
     if (s->k != 1) return;
     for (int c = 0; c < 3; ++c) {
-        limit->toward_next[c] = (double)(s->e[c] * s->scale);
-        limit->toward_prev[c] = (double)(s->e[3 + c] * s->scale);
+        limit->a[c] = limit->toward_next[c] = (double)(s->e[c] * s->scale);
+        limit->b[c] = limit->toward_prev[c] = (double)(s->e[3 + c] * s->scale);
     }
     limit->has_plane = true;
 }
@@ -256,6 +258,9 @@ static qp_status dart_limit(sector *s, qp_corner_work *work, qp_corner_limit *li
         if (step > 130 && change < 1e-17L) break;
     }
     if (n > 2) span_plane(s, along, across, theta, limit);
+    /* `along` is a mere direction: the condition is that of directions. */
+    const long double length = norm(across);
+    for (int c = 0; c < 3 && length > 0; ++c) limit->b[c] /= (double)length;
     return QP_OK;
 }
 

@@ -22,6 +22,8 @@ typedef struct qp_corner_limit {
      * product mean something. Where has_plane is false they are zero, or the tangents of the curve and across
      * it at a crease of five faces or more. */
     double toward_next[3], toward_prev[3];
+    double a[3],
+        b[3]; /* what the two are combinations of: at a right angle where the ring is an affine image of its eigenring */
     bool has_plane;
 } qp_corner_limit;
 

@@ -46,17 +46,31 @@ static void set_position(const cell *at, const qp_quad p[3], qp_reference_sample
     }
 }
 
+static double dot(const double a[3], const double b[3]) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static double cross(const double a[3], const double b[3], double out[3]) {
+    for (int c = 0; c < 3; ++c) out[c] = a[(c + 1) % 3] * b[(c + 2) % 3] - a[(c + 2) % 3] * b[(c + 1) % 3];
+    return sqrt(dot(out, out));
+}
+
+/* Ratio of the singular values of [a b]: the larger one's square is the larger eigenvalue of the matrix of dot products, and
+ * both multiply to |a x b|. */
+static double condition(const double a[3], const double b[3]) {
+    const double aa = dot(a, a), bb = dot(b, b), ab = dot(a, b);
+    double n[3];
+    return (aa + bb + hypot(aa - bb, 2 * ab)) / (2 * cross(a, b, n));
+}
+
 /* Unit normal from the derivatives, when they are neither vanishing nor parallel. */
 static void set_normal(qp_reference_sample *s) {
-    double n[3] = {s->du[1] * s->dv[2] - s->du[2] * s->dv[1], s->du[2] * s->dv[0] - s->du[0] * s->dv[2],
-                   s->du[0] * s->dv[1] - s->du[1] * s->dv[0]};
-    double nn = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-    double uu = sqrt(s->du[0] * s->du[0] + s->du[1] * s->du[1] + s->du[2] * s->du[2]);
-    double vv = sqrt(s->dv[0] * s->dv[0] + s->dv[1] * s->dv[1] + s->dv[2] * s->dv[2]);
+    double n[3];
+    const double nn = cross(s->du, s->dv, n), uu = sqrt(dot(s->du, s->du)), vv = sqrt(dot(s->dv, s->dv));
     /* One that is so much smaller than the other is 0 but for rounding. */
     const bool both = uu > 1e-14 * vv && vv > 1e-14 * uu;
     s->normal_defined = both && nn > 0 && nn >= 1e-6 * uu * vv;
-    s->sine = s->normal_defined ? nn / (uu * vv) : 0;
+    s->condition = s->normal_defined ? condition(s->du, s->dv) : INFINITY;
     for (int c = 0; c < 3; ++c) s->n[c] = s->normal_defined ? n[c] / nn : 0;
 }
 
@@ -94,7 +108,7 @@ static qp_status eval_corner(const visit *t, const cell *at, uint32_t j, qp_refe
     }
     set_normal(s);
     s->normal_defined = s->normal_defined && limit.has_plane;
-    if (!s->normal_defined) s->sine = 0;
+    s->condition = s->normal_defined ? condition(limit.a, limit.b) : INFINITY;
     return QP_OK;
 }
 

@@ -14,7 +14,10 @@ typedef struct qp_reference_sample {
     double n[3];         /* unit normal, or 0 where undefined */
     bool normal_defined; /* false where the surface has no tangent plane, or it is too ill-conditioned to tell
                           */
-    double sine; /* |du x dv| / (|du| |dv|): how well the tangents fix the normal; 0 where undefined */
+    /* Condition number of the tangent frame [du dv], the ratio of its singular values: 1 where they are of one length at a
+     * right angle, never less; infinite where the normal is undefined. At a corner of an irregular cell that of the two tangents
+     * that span the limit's plane, whatever part of a turn the patch takes of it. */
+    double condition;
 } qp_reference_sample;
 
 /* Limit position, derivatives and normal of one patch at count points uv[2*i], uv[2*i+1] in [0,1]; exact at
@@ -25,11 +28,20 @@ typedef struct qp_reference_sample {
 qp_status qp_reference_eval(const qp_mesh *mesh, const double *positions, uint32_t patch, size_t count,
                             const double *uv, qp_reference_sample *samples, qp_error *err);
 
+/* Normals of tangent frames up to this condition are well conditioned. Derivation: let J = [du dv] be off by an error E with
+ * |E| <= e |J|. The normal is the left singular vector of J's third, zero singular value, and E turns it by |E| / s_min at the
+ * most, to first order, with s_min the smaller of J's two singular values: by e |J| / s_min = e cond(J). One rounding to float
+ * is e = 6e-8; at a condition of 100 that is 6e-6, and 0.01 degrees, 1.75e-4, leave room for 29 of them: what positions in float
+ * and a sum of 16 of them take. Neither a rotation nor a scale of the surface changes the condition. */
+enum { QP_WELL_CONDITIONED = 100 };
+
 /* Error measures of DESIGN.md, "Measuring". */
 typedef struct qp_error_report {
     uint64_t samples, past_depth, normals_undefined, nonfinite;
-    uint64_t normals_parallel; /* tangents within 0.57 degrees of parallel (sine < 0.01), measured apart */
-    double parallel_normal_max_deg;
+    uint64_t
+        normals_ill; /* of samples whose tangent frame's condition exceeds QP_WELL_CONDITIONED, measured apart */
+    double ill_normal_max_deg,
+        ill_normal_deg_per_condition;  /* largest error of theirs, and over their condition */
     double position_max, position_rms; /* of the bounding box diagonal */
     double normal_max_deg, normal_rms_deg;
     uint32_t worst_patch;

@@ -143,7 +143,7 @@ static qp_status stress_patch(const stress *s, uint32_t patch, stress_worker *w)
     for (uint64_t i = 0; i < count; ++i) {
         const qp_stress_sample *r = &s->results[order[i]];
         measure_sample(s, order[i], ring.most, &w->samples[i]);
-        if (!r->finite || w->samples[i].sine < 0.01) continue;
+        if (!r->finite || w->samples[i].condition > QP_WELL_CONDITIONED) continue;
         s->well[order[i]] = r->normal_deg <= normal_limit(s->stream->precision);
         if (s->well[order[i]]) continue;
         memmove(w->uv + 2 * asked, w->uv + 2 * i, 2 * sizeof *w->uv);
@@ -161,7 +161,7 @@ static qp_status stress_patch(const stress *s, uint32_t patch, stress_worker *w)
     if (status != QP_OK) return status;
     for (uint64_t i = 0, at = 0; i < count; ++i) {
         const qp_stress_sample *r = &s->results[order[i]];
-        if (!r->finite || w->samples[i].sine < 0.01 || s->well[order[i]]) continue;
+        if (!r->finite || w->samples[i].condition > QP_WELL_CONDITIONED || s->well[order[i]]) continue;
         const qp_reference_sample *moved = &w->moved[at++];
         s->well[order[i]] =
             moved->normal_defined && angle(moved->n, r->n) <= normal_limit(s->stream->precision);

@@ -55,8 +55,8 @@ typedef struct qp_stress_sample {
  * patch's base face. The reference is the surface of the mesh's own double coordinates, so that the rounding of the coordinates
  * on their way to the device (half a unit at the most) counts as an error of the evaluation.
  *
- * The normal of a sample is *well conditioned* where the reference has one, its tangents are not almost parallel (sine at least
- * 0.01), and it turns by no more than 1e-3 degrees (double: 1e-11) when every coordinate of the 1-ring is moved up or down, at
+ * The normal of a sample is *well conditioned* where the reference has one, the condition of its tangents is QP_WELL_CONDITIONED
+ * at the most, and it turns by no more than 1e-3 degrees (double: 1e-11) when every coordinate of the 1-ring is moved up or down, at
  * random, by a unit in the last place of the largest one on its axis, as the device holds them (qp_mesh_local_frame). */
 typedef struct qp_stress_report {
     uint64_t cases, samples;

@@ -30,7 +30,7 @@ static void visit(const char *name, qp_mesh *mesh) {
                          CHECK_SANITIZED ? 300 : 20000, 1, &r))
                 continue;
             measure_add(&sums[precision], &r);
-            if (within_bounds(&r, (qp_precision)precision, 0.01)) continue;
+            if (within_bounds(&r, (qp_precision)precision)) continue;
             printf(
                 "%s, %s, %s: position %.3g at patch %u (%.9g, %.9g), normal %.3g at patch %u (%.9g, %.9g)\n",
                 name, set, precision ? "double" : "float", r.position_max, r.worst_patch, (double)r.worst_u,

@@ -57,7 +57,7 @@ static void check_stream(const qp_mesh *mesh, const qp_stream *s, tally *t) {
         qp_error err;
         if (!CHECK_OK(qp_reference_eval(mesh, mesh->positions, patches[i], 1, uvs + 2 * i, &r, &err), err))
             return;
-        if (r.sine > 0.01) t->plain_deg = fmax(t->plain_deg, angle(n, r.n));
+        if (r.condition < QP_WELL_CONDITIONED) t->plain_deg = fmax(t->plain_deg, angle(n, r.n));
         if (r.normal_defined || s->flags[i] & QP_SAMPLE_LIMIT_FRAME) continue;
         ++t->limits;
         t->limit_deg = fmax(t->limit_deg, angle_within(mesh, patches[i], uvs + 2 * i, n));

@@ -79,7 +79,7 @@ static void measure(const problem *p, const qp_peer *peer, double *position, dou
         }
         const double error = sqrt(square) / p->task.mesh->diagonal;
         if (!(error <= *position)) *position = error;
-        if (!ref->normal_defined || ref->sine < 0.1) continue;
+        if (!ref->normal_defined || ref->condition > 20) continue;
         const double degrees = angle(n, ref->n);
         if (!(degrees <= *normal)) *normal = degrees;
     }
