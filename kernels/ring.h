@@ -30,6 +30,7 @@
 typedef struct ring_patch {
     uint ticket;
     uint points, first; /* its place in the ring, canaries not counted */
+    uint span;          /* what it has of the ring, canaries and what was skipped counted */
     uint slot;
 } ring_patch;
 
@@ -86,15 +87,19 @@ QP_FUNCTION void ring_give_slot(volatile __global uint *ring, uint slot) {
 QP_FUNCTION ring_patch ring_begin(volatile __global uint *ring) {
     ring_patch p;
     p.ticket = qp_atomic_add(ring + QP_RB_TICKET, 1u);
-    p.points = p.first = 0;
+    p.points = p.first = p.span = 0;
     p.slot = QP_RB_NO_SLOT;
-    qp_atomic_max(ring + QP_RB_MOST_IN_FLIGHT, qp_atomic_add(ring + QP_RB_IN_FLIGHT, 1u) + 1u);
     if ((ring[QP_RB_OPTIONS] & QP_RB_TRACE) != 0) {
         p.slot = ring_take_slot(ring);
         qp_atomic_store(ring_record(ring, p.ticket) + QP_RECORD_SLOT, p.slot);
         ring_tick(ring, p.ticket, QP_TICK_START);
     }
     return p;
+}
+
+/* A word that only the caller changes is at least this. */
+QP_FUNCTION void ring_most(volatile __global uint *word, uint value) {
+    if (qp_atomic_load(word) < value) qp_atomic_store(word, value);
 }
 
 /* Waits until `need` points are free behind HEAD, and those to the ring's end if `need` is more than they are. Only for whoever has the turn. */
@@ -146,13 +151,13 @@ QP_FUNCTION void ring_allocate(volatile __global uint *ring, __global uint *memo
     }
     p->points = points;
     p->first = head + guard;
+    p->span = skip + need;
     qp_atomic_store(ring + QP_RB_HEAD, head + need);
-    qp_atomic_store(ring + QP_RB_CLAIMED, claimed + skip + need);
-    qp_atomic_add(ring + QP_RB_ALLOCATIONS, 1u);
+    qp_atomic_store(ring + QP_RB_CLAIMED, claimed + p->span);
     ring_count(ring + QP_RB_ALLOCATED, points);
-    qp_atomic_max(ring + QP_RB_PEAK, qp_atomic_add(ring + QP_RB_LIVE, points) + points);
-    qp_atomic_store(ring_record(ring, p->ticket) + QP_RECORD_POINTS, points);
-    qp_atomic_store(ring_record(ring, p->ticket) + QP_RECORD_SPAN, skip + need);
+    ring_most(ring + QP_RB_PEAK,
+              qp_atomic_load(ring + QP_RB_ALLOCATED) - qp_atomic_load(ring + QP_RB_RETURNED));
+    ring_most(ring + QP_RB_MOST_IN_FLIGHT, p->ticket + 1u - qp_atomic_load(ring + QP_RB_ENDED));
     qp_release();
     qp_atomic_store(ring + QP_RB_TURN, p->ticket + 1u);
     ring_tick(ring, p->ticket, QP_TICK_ALLOCATED);
@@ -160,13 +165,11 @@ QP_FUNCTION void ring_allocate(volatile __global uint *ring, __global uint *memo
 }
 
 /* Gives back the points of the oldest ticket. One caller at a time. */
-QP_FUNCTION void ring_give_back(volatile __global uint *ring, uint ticket) {
-    volatile __global uint *record = ring_record(ring, ticket);
-    const uint span = qp_atomic_load(record + QP_RECORD_SPAN) & ~QP_RECORD_DONE;
-    qp_atomic_sub(ring + QP_RB_LIVE, qp_atomic_load(record + QP_RECORD_POINTS));
+QP_FUNCTION void ring_give_back(volatile __global uint *ring, uint ticket, uint span, uint points) {
     ring_tick(ring, ticket, QP_TICK_RETIRED);
+    qp_atomic_store(ring + QP_RB_RETURNED, qp_atomic_load(ring + QP_RB_RETURNED) + points);
     qp_release();
-    qp_atomic_add(ring + QP_RB_RELEASED, span);
+    qp_atomic_store(ring + QP_RB_RELEASED, qp_atomic_load(ring + QP_RB_RELEASED) + span);
     qp_atomic_store(ring + QP_RB_RETIRED, ticket + 1u);
 }
 
@@ -179,12 +182,16 @@ QP_FUNCTION void ring_sweep(volatile __global uint *ring) {
     do {
         qp_acquire();
         uint ticket = qp_atomic_load(ring + QP_RB_RETIRED);
-        /* Records from TURN on are not yet written. */
-        const uint turn = qp_atomic_load(ring + QP_RB_TURN);
-        qp_acquire();
-        while (ticket != turn &&
-               (qp_atomic_load(ring_record(ring, ticket) + QP_RECORD_SPAN) & QP_RECORD_DONE) != 0)
-            ring_give_back(ring, ticket++);
+        /* There is no record behind that of the last ticket. */
+        const uint end = qp_atomic_load(ring + QP_RB_TICKET);
+        for (; ticket != end; ++ticket) {
+            volatile __global uint *record = ring_record(ring, ticket);
+            const uint span = qp_atomic_load(record + QP_RECORD_SPAN);
+            if (span == 0) break;
+            qp_acquire();
+            qp_atomic_store(record + QP_RECORD_SPAN, 0u);
+            ring_give_back(ring, ticket, span - 1u, qp_atomic_load(record + QP_RECORD_POINTS));
+        }
         qp_release();
         seen = qp_atomic_sub(ring + QP_RB_PENDING, seen) - seen;
     } while (seen != 0);
@@ -214,17 +221,21 @@ QP_FUNCTION void ring_retire(volatile __global uint *ring, __global const uint *
                              ring_patch p) {
     ring_inspect(ring, memory, point_words, p);
     ring_tick(ring, p.ticket, QP_TICK_DONE);
+    const uint options = ring[QP_RB_OPTIONS];
+    volatile __global uint *record = ring_record(ring, p.ticket);
+    if ((options & (QP_RB_IN_ORDER | QP_RB_TRACE)) != QP_RB_IN_ORDER)
+        qp_atomic_store(record + QP_RECORD_POINTS, p.points);
     qp_release();
-    if ((ring[QP_RB_OPTIONS] & QP_RB_IN_ORDER) != 0) {
+    if ((options & QP_RB_IN_ORDER) != 0) {
         while (qp_atomic_load(ring + QP_RB_RETIRED) != p.ticket) qp_wait();
         qp_acquire();
-        ring_give_back(ring, p.ticket);
+        ring_give_back(ring, p.ticket, p.span, p.points);
     } else {
-        qp_atomic_add(ring_record(ring, p.ticket) + QP_RECORD_SPAN, QP_RECORD_DONE);
+        qp_atomic_store(record + QP_RECORD_SPAN, p.span + 1u);
         ring_sweep(ring);
     }
     ring_give_slot(ring, p.slot);
-    qp_atomic_sub(ring + QP_RB_IN_FLIGHT, 1u);
+    qp_atomic_add(ring + QP_RB_ENDED, 1u);
 }
 
 #endif

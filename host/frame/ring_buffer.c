@@ -47,6 +47,10 @@ static size_t record_words(const qp_frame *frame) {
     return frame->options.supports.trace ? QP_RECORD_TRACE_WORDS : QP_RECORD_WORDS;
 }
 
+static size_t word_bytes(const qp_frame *frame) {
+    return (QP_RB_WORDS + frame->ring.n_tickets * record_words(frame)) * sizeof(uint32_t);
+}
+
 qp_status qp_ring_reserve(qp_frame *frame, qp_error *err) {
     const qp_supports_options *supports = &frame->options.supports;
     qp_ring_buffer *ring = &frame->ring;
@@ -70,9 +74,10 @@ qp_status qp_ring_reserve(qp_frame *frame, qp_error *err) {
         ring->since_ms = qp_now_ms();
         ring->since_ticks = qp_device_ticks(frame->device);
     }
-    const size_t words = QP_RB_WORDS + ring->n_tickets * record_words(frame);
-    qp_status status = qp_buffer_reserve(frame->device, &ring->words, words * sizeof(uint32_t),
-                                         "the ring buffer's records", err);
+    const size_t bytes = word_bytes(frame);
+    if (ring->words.bytes < bytes) ring->cleared = false;
+    qp_status status =
+        qp_buffer_reserve(frame->device, &ring->words, bytes, "the ring buffer's records", err);
     if (status != QP_OK) return status;
     return qp_buffer_reserve(frame->device, &ring->points,
                              ((size_t)ring->capacity + 2 * QP_RB_MARGIN) * point_bytes(frame),
@@ -96,11 +101,16 @@ static qp_status fill_with_canaries(qp_frame *frame, qp_error *err) {
 
 qp_status qp_ring_reset(qp_frame *frame, qp_error *err) {
     const qp_supports_options *supports = &frame->options.supports;
-    uint32_t words[QP_RB_WORDS] = {0};
+    /* An evaluation that came to its end has left its records as they are to be. */
+    const size_t bytes = frame->ring.cleared ? QP_RB_WORDS * sizeof(uint32_t) : word_bytes(frame);
+    uint32_t *words = qp_alloc(bytes, 1, true);
+    if (words == NULL) return qp_fail_memory(err, bytes, "the ring buffer's records");
+    frame->ring.cleared = false;
     words[QP_RB_CAPACITY] = frame->ring.capacity;
     words[QP_RB_OPTIONS] = (supports->retirement == QP_RETIRE_IN_ORDER ? QP_RB_IN_ORDER : 0) |
                            (supports->canaries ? QP_RB_CANARIES : 0) | (supports->trace ? QP_RB_TRACE : 0);
-    qp_status status = qp_buffer_write(frame->device, &frame->ring.words, words, sizeof words, err);
+    qp_status status = qp_buffer_write(frame->device, &frame->ring.words, words, bytes, err);
+    free(words);
     return status == QP_OK && supports->canaries ? fill_with_canaries(frame, err) : status;
 }
 
@@ -221,11 +231,12 @@ qp_status qp_ring_report(qp_frame *frame, qp_stream *stream, qp_error *err) {
     if (words[QP_RB_RETIRED] != frame->ring.n_tickets)
         return qp_fail(err, QP_SYSTEM, "ring buffer: %u of %u patches retired on %s", words[QP_RB_RETIRED],
                        frame->ring.n_tickets, qp_device_name(frame->device));
+    frame->ring.cleared = true;
     const double ticks_per_ms = words[QP_RB_STALLS] != 0 || supports->trace ? tick_rate(frame) : 0;
     qp_supports_report *report = &stream->supports;
     report->capacity_bytes = supports->ring_bytes / bytes * bytes;
     report->peak_bytes = words[QP_RB_PEAK] * bytes;
-    report->allocations = words[QP_RB_ALLOCATIONS];
+    report->allocations = words[QP_RB_TURN];
     report->allocated_bytes = wide(words + QP_RB_ALLOCATED) * bytes;
     report->stalls = words[QP_RB_STALLS];
     report->stall_ms = ticks_per_ms > 0 ? (double)wide(words + QP_RB_STALL_TICKS) / ticks_per_ms : 0;

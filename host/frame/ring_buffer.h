@@ -12,6 +12,7 @@ struct qp_frame_batch;
 /* Of a frame; zero-initialised. */
 typedef struct qp_ring_buffer {
     qp_buffer words, points; /* kernels/ring_layout.h */
+    bool cleared;            /* records in words are 0, or as an evaluation leaves them */
     uint32_t capacity;       /* points, room for canaries included */
     uint32_t n_tickets;      /* patches that need a ring, of all batches */
     uint32_t *items;         /* [entries] item of the layout of each; NULL without a trace */
