@@ -20,7 +20,8 @@ typedef struct hand_plan {
     uint32_t patch_plan[4];
     uint8_t rotation[4];
     uint64_t patch_ring[4];
-    uint32_t ring[HAND_RING], tree[HAND_WORDS];
+    uint32_t patch_offsets[5], face_offsets[5], face_vertices[16];
+    uint32_t ring[4 * HAND_RING], tree[HAND_WORDS];
     double weights[HAND_POINTS * HAND_RING], constants[HAND_CONSTANTS];
     double positions[3 * HAND_RING];
     uint8_t scales[HAND_POINTS];
@@ -44,7 +45,10 @@ static inline float hand_coordinate(void) {
 static inline void hand_begin(hand_plan *h, uint32_t ring_size) {
     memset(h, 0, sizeof *h);
     h->mesh.n_vertices = ring_size;
-    h->mesh.n_patches = 4;
+    h->mesh.n_patches = h->mesh.n_faces = 4;
+    h->mesh.patch_offsets = h->patch_offsets;
+    h->mesh.face_offsets = h->face_offsets;
+    h->mesh.face_vertices = h->face_vertices; /* all are vertex 0, to which points are anchored so */
     h->mesh.positions = h->positions;
     h->surface.mesh = &h->mesh;
     h->surface.n_plans = 1;
@@ -55,9 +59,16 @@ static inline void hand_begin(hand_plan *h, uint32_t ring_size) {
     h->surface.patch_rotation = h->rotation;
     h->surface.patch_ring = h->patch_ring;
     h->surface.rings = h->ring;
-    h->surface.ring_entries = ring_size;
-    for (uint32_t i = 0; i < ring_size; ++i) h->ring[i] = i;
-    for (uint8_t p = 0; p < 4; ++p) h->rotation[p] = p;
+    h->surface.ring_entries = 4 * ring_size;
+    for (uint32_t i = 0; i < 4 * ring_size; ++i) h->ring[i] = i % ring_size;
+    for (uint8_t p = 0; p < 4; ++p) {
+        h->rotation[p] = p;
+        h->patch_ring[p] = p * (uint64_t)ring_size;
+    }
+    for (uint32_t p = 0; p <= 4; ++p) {
+        h->patch_offsets[p] = p;
+        h->face_offsets[p] = 4 * p;
+    }
     h->plan.ring_size = ring_size;
     h->plan.tree = h->tree;
     h->plan.weights = h->weights;
