@@ -51,7 +51,7 @@ static qp_status cut_batch(qp_frame *frame, size_t begin, size_t *end, uint32_t 
         const qp_frame_item *item = &layout->items[i];
         const bool fast = qp_frame_is_fast(frame, item->patch);
         const uint64_t points = fast ? 0 : item_rows(frame, item);
-        const bool full = batch->points + points > most_points && !qp_frame_is_fused(frame);
+        const bool full = batch->points + points > most_points && !qp_frame_has_ring(frame);
         if (i > begin && (batch->n_samples + item->samples > most_samples || full)) break;
         batch->n_samples += item->samples;
         batch->points += points;
@@ -202,7 +202,7 @@ qp_status qp_frame_upload_layout(qp_frame *frame, qp_error *err) {
         status = upload_grid(frame, &frame->grid_u, layout->grid_u, layout->grid_points, err);
     if (status == QP_OK)
         status = upload_grid(frame, &frame->grid_v, layout->grid_v, layout->grid_points, err);
-    if (status == QP_OK && qp_frame_is_fused(frame))
+    if (status == QP_OK && qp_frame_has_ring(frame))
         status = qp_ring_reserve(frame, err);
     else if (status == QP_OK)
         status = qp_buffer_reserve(frame->device, &frame->support,

@@ -95,8 +95,8 @@ void qp_frame_free(qp_frame *frame) {
 /* Starts the kernels of every batch. */
 static qp_status launch_batches(qp_frame *frame, double *hull_ms, double *domain_ms, qp_error *err) {
     const uint32_t want = frame->options.want_derivatives != 0;
-    const bool fused = qp_frame_is_fused(frame), cached = qp_frame_is_cached(frame);
-    qp_status status = fused ? qp_ring_reset(frame, err) : cached ? qp_cache_begin(frame, err) : QP_OK;
+    const bool has_ring = qp_frame_has_ring(frame), cached = qp_frame_is_cached(frame);
+    qp_status status = has_ring ? qp_ring_reset(frame, err) : cached ? qp_cache_begin(frame, err) : QP_OK;
     for (size_t b = 0; b < frame->n_batches && status == QP_OK; ++b) {
         qp_frame_batch *batch = &frame->batches[b];
         status = qp_buffer_unmap(frame->device, &batch->vertices, err);
@@ -117,12 +117,12 @@ static qp_status launch_batches(qp_frame *frame, double *hull_ms, double *domain
                                   {&frame->grid_u, 0},   {&frame->grid_v, 0},
                                   {&batch->vertices, 0}, {&batch->flags, 0},
                                   {derivatives, 0},      {NULL, want}};
-        if (status == QP_OK && fused) status = qp_ring_launch(frame, b, domain_ms, err);
+        if (status == QP_OK && has_ring) status = qp_ring_launch(frame, b, hull_ms, domain_ms, err);
         if (status == QP_OK && cached) status = qp_cache_launch(frame, batch, hull_ms, err);
-        if (status == QP_OK && !fused && !cached)
+        if (status == QP_OK && !has_ring && !cached)
             status = qp_launch(frame->device, &frame->program, QP_KERNEL_HULL, hull,
                                sizeof hull / sizeof hull[0], batch->n_general, hull_ms, err);
-        if (status == QP_OK && !fused)
+        if (status == QP_OK && !has_ring)
             status = qp_launch(frame->device, &frame->program, QP_KERNEL_DOMAIN, domain,
                                sizeof domain / sizeof domain[0], batch->n_general, domain_ms, err);
         if (status == QP_OK)
@@ -210,7 +210,7 @@ static qp_status evaluate(qp_frame *frame, qp_stream *stream, qp_error *err) {
         if (status == QP_OK && frame->options.want_derivatives)
             status = qp_buffer_map(frame->device, &frame->batches[b].derivatives, err);
     }
-    if (status == QP_OK && qp_frame_is_fused(frame)) status = qp_ring_report(frame, stream, err);
+    if (status == QP_OK && qp_frame_has_ring(frame)) status = qp_ring_report(frame, stream, err);
     if (status == QP_OK && qp_frame_is_cached(frame)) status = qp_cache_report(frame, &stream->supports, err);
     if (status != QP_OK) qp_cache_distrust(frame);
     if (status == QP_OK) qp_copies_apply(&layout->copies, frame->real_size, frame->vertices, frame->flags);

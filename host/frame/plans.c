@@ -174,7 +174,9 @@ static qp_status build_kernels(qp_frame *frame, qp_error *err) {
             if (step == 0 && qp_frame_is_fast(frame, p)) {
                 kernels |= 1u << QP_KERNEL_REGULAR;
             } else {
-                kernels |= qp_frame_is_fused(frame) ? 1u << QP_KERNEL_FUSED
+                kernels |= qp_frame_is_streamed(frame)
+                               ? 1u << QP_KERNEL_STREAM_HULL | 1u << QP_KERNEL_STREAM_DOMAIN
+                           : qp_frame_has_ring(frame) ? 1u << QP_KERNEL_FUSED
                            : qp_frame_is_cached(frame)
                                ? 1u << QP_KERNEL_CACHED_HULL | 1u << QP_KERNEL_CACHE_FORGET | 1u << QP_KERNEL_DOMAIN
                                : 1u << QP_KERNEL_HULL | 1u << QP_KERNEL_DOMAIN;

@@ -6,9 +6,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-bool qp_frame_is_fused(const qp_frame *frame) {
-    const qp_supports_options *supports = &frame->options.supports;
-    return supports->kind == QP_SUPPORTS_RING && supports->schedule == QP_SCHEDULE_FUSED;
+bool qp_frame_has_ring(const qp_frame *frame) {
+    return frame->options.supports.kind == QP_SUPPORTS_RING;
+}
+
+bool qp_frame_is_streamed(const qp_frame *frame) {
+    return qp_frame_has_ring(frame) && frame->options.supports.schedule == QP_SCHEDULE_STREAMED;
 }
 
 static size_t point_bytes(const qp_frame *frame) {
@@ -18,7 +21,7 @@ static size_t point_bytes(const qp_frame *frame) {
 /* ---- Room ---- */
 
 qp_status qp_ring_start_notes(qp_frame *frame, qp_error *err) {
-    if (!frame->options.supports.trace) return QP_OK;
+    if (!frame->options.supports.trace && !qp_frame_is_streamed(frame)) return QP_OK;
     const size_t n = frame->layout.n_items;
     frame->ring.items = qp_alloc(n, sizeof *frame->ring.items, false);
     return frame->ring.items == NULL ? qp_fail_memory(err, n * sizeof(uint32_t), "a trace") : QP_OK;
@@ -79,9 +82,9 @@ qp_status qp_ring_reserve(qp_frame *frame, qp_error *err) {
     qp_status status =
         qp_buffer_reserve(frame->device, &ring->words, bytes, "the ring buffer's records", err);
     if (status != QP_OK) return status;
-    return qp_buffer_reserve(frame->device, &ring->points,
-                             ((size_t)ring->capacity + 2 * QP_RB_MARGIN) * point_bytes(frame),
-                             "the ring buffer", err);
+    status = qp_buffer_reserve(frame->device, &ring->points,
+                               ((size_t)ring->capacity + 2 * QP_RB_MARGIN) * point_bytes(frame), "the ring buffer", err);
+    return status == QP_OK && qp_frame_is_streamed(frame) ? qp_streamed_plan(frame, err) : status;
 }
 
 /* ---- An evaluation ---- */
@@ -114,7 +117,8 @@ qp_status qp_ring_reset(qp_frame *frame, qp_error *err) {
     return status == QP_OK && supports->canaries ? fill_with_canaries(frame, err) : status;
 }
 
-qp_status qp_ring_launch(qp_frame *frame, size_t b, double *ms, qp_error *err) {
+qp_status qp_ring_launch(qp_frame *frame, size_t b, double *hull_ms, double *domain_ms, qp_error *err) {
+    if (qp_frame_is_streamed(frame)) return qp_streamed_launch_batch(frame, b, hull_ms, domain_ms, err);
     const qp_frame_batch *batch = &frame->batches[b];
     const uint32_t want = frame->options.want_derivatives != 0;
     uint32_t first_ticket = 0;
@@ -137,7 +141,7 @@ qp_status qp_ring_launch(qp_frame *frame, size_t b, double *ms, qp_error *err) {
                            {derivatives, 0},
                            {NULL, want}};
     return qp_launch(frame->device, &frame->program, QP_KERNEL_FUSED, args, sizeof args / sizeof args[0],
-                     batch->n_general, ms, err);
+                     batch->n_general, domain_ms, err);
 }
 
 /* ---- What happened ---- */
@@ -249,7 +253,7 @@ qp_status qp_ring_report(qp_frame *frame, qp_stream *stream, qp_error *err) {
         status = read_trace(frame, ticks_per_ms, err);
         stream->trace = &frame->ring.trace;
     }
-    return status;
+    return status == QP_OK && qp_frame_is_streamed(frame) ? qp_streamed_report(frame, stream, err) : status;
 }
 
 void qp_ring_free(qp_frame *frame) {
@@ -258,5 +262,6 @@ void qp_ring_free(qp_frame *frame) {
     qp_buffer_free(frame->device, &ring->points);
     free(ring->items);
     free(ring->patches);
+    qp_streamed_free(&ring->streamed);
     *ring = (qp_ring_buffer){0};
 }

@@ -3,7 +3,7 @@
 #ifndef QP_FRAME_RING_BUFFER_H
 #define QP_FRAME_RING_BUFFER_H
 
-#include "host/device/device.h"
+#include "host/frame/streamed.h"
 
 struct qp_frame;
 struct qp_frame_item;
@@ -15,15 +15,18 @@ typedef struct qp_ring_buffer {
     bool cleared;            /* records in words are 0, or as an evaluation leaves them */
     uint32_t capacity;       /* points, room for canaries included */
     uint32_t n_tickets;      /* patches that need a ring, of all batches */
-    uint32_t *items;         /* [entries] item of the layout of each; NULL without a trace */
+    uint32_t *items;         /* [entries] item of the layout of each; NULL in the fused schedule without a trace */
+    qp_streamed streamed;    /* in the streamed schedule */
     qp_trace trace;
     qp_trace_patch *patches;
     double since_ms; /* both clocks, when the buffer was made */
     uint64_t since_ticks;
 } qp_ring_buffer;
 
-/* Does the frame run the fused kernel? */
-bool qp_frame_is_fused(const struct qp_frame *frame);
+/* Does the frame have a ring buffer? */
+bool qp_frame_has_ring(const struct qp_frame *frame);
+/* With the streamed schedule? */
+bool qp_frame_is_streamed(const struct qp_frame *frame);
 /* Before entries are written: room for what qp_ring_note keeps. */
 qp_status qp_ring_start_notes(struct qp_frame *frame, qp_error *err);
 /* Entry number `entry` is item number `item` of the layout. */
@@ -32,8 +35,9 @@ void qp_ring_note(struct qp_frame *frame, uint32_t entry, size_t item);
 qp_status qp_ring_reserve(struct qp_frame *frame, qp_error *err);
 /* An empty ring, before the batches of an evaluation. */
 qp_status qp_ring_reset(struct qp_frame *frame, qp_error *err);
-/* Starts the patches of batch number b that need points; the time goes to *ms (device.h). */
-qp_status qp_ring_launch(struct qp_frame *frame, size_t b, double *ms, qp_error *err);
+/* Starts the patches of batch number b that need points; the time goes to *domain_ms (device.h), in the streamed schedule that of the
+ * hull stage to *hull_ms. */
+qp_status qp_ring_launch(struct qp_frame *frame, size_t b, double *hull_ms, double *domain_ms, qp_error *err);
 /* After all batches: what happened, in *stream. Errors: QP_CHECK_FAILED when a canary is dead. */
 qp_status qp_ring_report(struct qp_frame *frame, qp_stream *stream, qp_error *err);
 void qp_ring_free(struct qp_frame *frame);
