@@ -80,12 +80,13 @@ def draw_slowdown(axes, result):
         axes.set_ylim(0.95, top * 1.15)
     else:
         axes.set_ylim(1 - 0.05 * (top - 1), top + 0.08 * (top - 1))
-    for x, colour, style, label in ((smallest, RED, "-", "99 % of scratch's throughput: %s"),
+    for x, colour, style, label in ((smallest, RED, "-", "99 %% of scratch's throughput: %s"),
                                     (estimate, GREEN, "--", "the paper's estimate: %s"),
                                     (worst, GREY, ":", "worst-case scratch: %s")):
         if x > 0:
             axes.axvline(x, color=colour, linestyle=style, linewidth=1.3, label=label % size_text(x))
-    axes.legend(fontsize=8.5, loc="upper right", framealpha=0.95)
+    if marks:
+        axes.legend(fontsize=8.5, loc="upper right", framealpha=0.95)
     finish(axes, "size against slowdown", "ring buffer", "time, unlimited scratch = 1")
 
 
@@ -101,13 +102,16 @@ def draw_histogram(axes, result):
     if count:
         mean = result["points"] / count
         axes.axvline(mean, color=RED, linewidth=1.3, label="mean %.1f" % mean)
-        axes.legend(fontsize=8.5, loc="upper right")
     without = result["patches"] - count
-    finish(axes, "control points per patch" + (" (%s patches need none)" % format(without, ",") if without else ""),
-           "control points", "patches")
+    if without:
+        axes.plot([], [], linestyle="", label="%s patches need none" % format(without, ","))
+    if count or without:
+        axes.legend(fontsize=8.5, loc="upper right", handlelength=1.2)
+    finish(axes, "control points per patch", "control points", "patches")
 
 
 def draw_live(axes, result):
+    unit, name = (1e6, "million cycles") if result["scratch"]["cycles"] >= 1e6 else (1e3, "thousand cycles")
     for live, colour in zip(result["live"], (BLACK, RED)):
         step = live["interval_cycles"]
         xs, ys = [], []
@@ -115,11 +119,13 @@ def draw_live(axes, result):
             xs += [i * step, min((i + 1) * step, live["cycles"])]
             ys += [value, value]
         label = "unlimited scratch" if live["ring_bytes"] == 0 else "ring of %s" % size_text(live["ring_bytes"])
-        axes.plot([x / 1e6 for x in xs], ys, color=colour, linewidth=1.1, label=label)
-    axes.set_ylim(0, axes.get_ylim()[1] * 1.18)
+        axes.plot([x / unit for x in xs], ys, color=colour, linewidth=1.1, label=label)
+    top = max([1] + [max(live["bytes"] or [0]) for live in result["live"]]) * 1.25
+    axes.set_ylim(0, top)
+    axes.yaxis.set_major_locator(matplotlib.ticker.MultipleLocator(2.0 ** max(0, int(top).bit_length() - 3)))
     axes.yaxis.set_major_formatter(matplotlib.ticker.FuncFormatter(size_text))
     axes.legend(fontsize=8.5, loc="upper right", ncol=2)
-    finish(axes, "live bytes over time", "million cycles", "most in each interval")
+    finish(axes, "live bytes over time", name, "most in each interval")
 
 
 def draw_ring(result):

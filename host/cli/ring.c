@@ -84,10 +84,11 @@ static void count_work(ring_run *run) {
     run->histogram_bins = run->with_points == 0 ? 0 : most / run->histogram_width + 1;
     run->largest_bytes = (uint64_t)most * run->machine.point_bytes;
     run->worst_case_bytes = run->points * run->machine.point_bytes;
-    const double slots = (double)run->machine.sms * run->machine.warps;
+    const uint64_t slots = (uint64_t)run->machine.sms * run->machine.warps;
+    run->at_once = slots < run->with_points ? slots : run->with_points;
     if (run->with_points != 0)
         run->estimate_bytes =
-            (uint64_t)(slots * (double)run->worst_case_bytes / (double)run->with_points + 0.5);
+            (uint64_t)((double)run->at_once * (double)run->worst_case_bytes / (double)run->with_points + 0.5);
 }
 
 static qp_status simulate(ring_run *run, const uint64_t *sizes, qp_error *err) {

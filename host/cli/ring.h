@@ -38,7 +38,8 @@ typedef struct ring_run {
     uint64_t with_points, points, samples; /* patches that have control points; sums */
     double weights;
     uint64_t largest_bytes, worst_case_bytes;
-    uint64_t estimate_bytes; /* as the paper estimates: slots x mean points x bytes */
+    uint64_t at_once;        /* slots, or patches with points where they are fewer */
+    uint64_t estimate_bytes; /* as the paper estimates: at_once x mean points x bytes */
     uint32_t histogram_width,
         histogram_bins; /* patches by control points: bin i has those of [i, i + 1) x width */
     uint64_t histogram[RING_HISTOGRAM_MOST];

@@ -83,9 +83,9 @@ void ring_write_table(const void *result, FILE *file) {
     fprintf(file, "\nworst-case scratch: %" PRIu64 " bytes (%s)\n", run->worst_case_bytes,
             size_text(run->worst_case_bytes, a));
     fprintf(file,
-            "the paper's estimate (section 8.1; there 1 MB against 22 MB for Armor Guy): %" PRIu32
+            "the paper's estimate (section 8.1; there 1 MB against 22 MB for Armor Guy): %" PRIu64
             " in flight x %.1f points x %" PRIu32 " bytes = %" PRIu64 " (%s)\n",
-            m->sms * m->warps, run->with_points == 0 ? 0 : (double)run->points / (double)run->with_points,
+            run->at_once, run->with_points == 0 ? 0 : (double)run->points / (double)run->with_points,
             m->point_bytes, run->estimate_bytes, size_text(run->estimate_bytes, b));
     fprintf(file,
             "smallest ring with 99 percent of scratch's throughput: %" PRIu64
