@@ -43,6 +43,7 @@
     X(DrawArrays, DRAWARRAYS)                                                                                \
     X(DrawBuffer, DRAWBUFFER)                                                                                \
     X(DrawBuffers, DRAWBUFFERS)                                                                              \
+    X(DispatchCompute, DISPATCHCOMPUTE)                                                                      \
     X(DrawElements, DRAWELEMENTS)                                                                            \
     X(Enable, ENABLE)                                                                                        \
     X(EnableVertexAttribArray, ENABLEVERTEXATTRIBARRAY)                                                      \
@@ -68,6 +69,7 @@
     X(GetString, GETSTRING)                                                                                  \
     X(GetUniformLocation, GETUNIFORMLOCATION)                                                                \
     X(LinkProgram, LINKPROGRAM)                                                                              \
+    X(MemoryBarrier, MEMORYBARRIER)                                                                          \
     X(PatchParameteri, PATCHPARAMETERI)                                                                      \
     X(PixelStorei, PIXELSTOREI)                                                                              \
     X(PolygonOffset, POLYGONOFFSET)                                                                          \
@@ -82,6 +84,7 @@
     X(TransformFeedbackVaryings, TRANSFORMFEEDBACKVARYINGS)                                                  \
     X(Uniform1f, UNIFORM1F)                                                                                  \
     X(Uniform1i, UNIFORM1I)                                                                                  \
+    X(Uniform1ui, UNIFORM1UI)                                                                                \
     X(Uniform2f, UNIFORM2F)                                                                                  \
     X(Uniform3f, UNIFORM3F)                                                                                  \
     X(Uniform3fv, UNIFORM3FV)                                                                                \
