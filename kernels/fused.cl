@@ -18,9 +18,13 @@ __kernel void QP_NAME(fused)(__global const uint *heads, __global const uint *tr
     const uint point_words = (uint)sizeof(real);
     (void)get_group_id(0);
     if (leads) {
+        /* Looked up before the ticket is taken, which may then be another one, so that nobody waits for his turn while this group
+         * waits for memory. There is such a patch, for this group has not had its own. */
+        const uint next = qp_atomic_load(ring + QP_RB_TICKET);
+        uint rows = ring_points(heads, entries + ((ulong)first_entry + next) * QP_ENTRY_WORDS);
         ring_patch patch = ring_begin(ring);
-        __global const uint *entry = entries + ((ulong)first_entry + patch.ticket) * QP_ENTRY_WORDS;
-        const uint rows = heads[entry[QP_ENTRY_HEAD] + QP_HEAD_ROWS + entry[QP_ENTRY_LEVEL]];
+        if (patch.ticket != next)
+            rows = ring_points(heads, entries + ((ulong)first_entry + patch.ticket) * QP_ENTRY_WORDS);
         ring_allocate(ring, (__global uint *)memory, point_words, rows, &patch);
         place = patch;
     }

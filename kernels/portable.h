@@ -11,6 +11,9 @@
 #ifndef QP_KERNELS_PORTABLE_H
 #define QP_KERNELS_PORTABLE_H
 
+/* Rounds that an item waits for others (qp_wait) before it makes room for them. */
+#define QP_WAIT_ROUNDS 30u
+
 #ifdef __OPENCL_VERSION__
 
 #pragma OPENCL FP_CONTRACT OFF
@@ -43,15 +46,19 @@
 /* A word of local memory, to tell or count among the items of a group. */
 #define qp_local_add(p, value) atomic_add((p), (value))
 #define qp_popcount(x) popcount(x)
-/* Once a round while an item waits for others. Where kernels run on Linux as code of the processor's own (QP_KERNEL_YIELD: 24 is
- * sched_yield), the thread makes room, for the one that is waited for may have been put aside in its favour. */
+/* Once a round while an item waits for others, with the number of rounds so far. Where kernels run on Linux as code of the processor's
+ * own (QP_KERNEL_YIELD: 24 is sched_yield), the thread makes room after some, for the one that is waited for may have been put aside
+ * in its favour. */
 #ifdef QP_KERNEL_YIELD
-QP_FUNCTION void qp_wait(void) {
+QP_FUNCTION void qp_wait(uint round) {
     long call = 24;
-    __asm__ volatile("syscall" : "+a"(call) : : "rcx", "r11", "memory");
+    if (round < QP_WAIT_ROUNDS)
+        __asm__ volatile("pause" : : : "memory");
+    else
+        __asm__ volatile("syscall" : "+a"(call) : : "rcx", "r11", "memory");
 }
 #else
-#define qp_wait() ((void)0)
+#define qp_wait(round) ((void)(round))
 #endif
 /* With QP_KERNEL_CLOCK: ticks of a clock that all work-groups share. */
 #define qp_clock() ((ulong)__builtin_readcyclecounter())
@@ -94,9 +101,9 @@ QP_FUNCTION void qp_wait(void) {
 #define qp_local_add(p, value) (*(p) += (value))
 #define qp_popcount(x) ((uint32_t)__builtin_popcount(x))
 /* host_kernels.c */
-void qp_host_wait(void);
+void qp_host_wait(uint32_t round);
 uint64_t qp_host_clock(void);
-#define qp_wait() qp_host_wait()
+#define qp_wait(round) qp_host_wait(round)
 #define QP_KERNEL_CLOCK 1
 #define qp_clock() qp_host_clock()
 static inline void qp_host_atomic_max(volatile uint32_t *p, uint32_t value) {

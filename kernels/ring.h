@@ -84,6 +84,11 @@ QP_FUNCTION void ring_give_slot(volatile __global uint *ring, uint slot) {
     if (slot != QP_RB_NO_SLOT) qp_atomic_sub(ring + QP_RB_SLOTS + slot / 32u, 1u << (slot % 32u));
 }
 
+/* Points that an entry's patch needs at its level. */
+QP_FUNCTION uint ring_points(__global const uint *heads, __global const uint *entry) {
+    return heads[entry[QP_ENTRY_HEAD] + QP_HEAD_ROWS + entry[QP_ENTRY_LEVEL]];
+}
+
 QP_FUNCTION ring_patch ring_begin(volatile __global uint *ring) {
     ring_patch p;
     p.ticket = qp_atomic_add(ring + QP_RB_TICKET, 1u);
@@ -110,8 +115,9 @@ QP_FUNCTION uint ring_wait_for_room(volatile __global uint *ring, uint claimed, 
 #ifdef QP_KERNEL_CLOCK
     const ulong since = ring_clock(ring);
 #endif
+    uint round = 0;
     do {
-        qp_wait();
+        qp_wait(round++);
         used = claimed - qp_atomic_load(ring + QP_RB_RELEASED);
     } while (used != 0 && need > capacity - used);
     qp_atomic_add(ring + QP_RB_STALLS, 1u);
@@ -134,7 +140,7 @@ QP_FUNCTION void ring_plant(volatile __global uint *ring, __global uint *memory,
 /* The place of p's `points` points in the ring. */
 QP_FUNCTION void ring_allocate(volatile __global uint *ring, __global uint *memory, uint point_words,
                                uint points, ring_patch *p) {
-    while (qp_atomic_load(ring + QP_RB_TURN) != p->ticket) qp_wait();
+    for (uint round = 0; qp_atomic_load(ring + QP_RB_TURN) != p->ticket; ++round) qp_wait(round);
     qp_acquire();
     const uint guard = (ring[QP_RB_OPTIONS] & QP_RB_CANARIES) != 0 ? QP_RB_GUARD : 0u;
     const uint need = points + 2u * guard, claimed = qp_atomic_load(ring + QP_RB_CLAIMED);
@@ -227,7 +233,7 @@ QP_FUNCTION void ring_retire(volatile __global uint *ring, __global const uint *
         qp_atomic_store(record + QP_RECORD_POINTS, p.points);
     qp_release();
     if ((options & QP_RB_IN_ORDER) != 0) {
-        while (qp_atomic_load(ring + QP_RB_RETIRED) != p.ticket) qp_wait();
+        for (uint round = 0; qp_atomic_load(ring + QP_RB_RETIRED) != p.ticket; ++round) qp_wait(round);
         qp_acquire();
         ring_give_back(ring, p.ticket, p.span, p.points);
     } else {

@@ -21,8 +21,8 @@ typedef struct qp_host_kernels {
 /* The best build of the kernels for this processor. All builds give the same bits. */
 const qp_host_kernels *qp_host_kernels_for(qp_precision precision);
 
-/* What kernels call when they wait for another work-group, and their clock, in nanoseconds. */
-void qp_host_wait(void);
+/* What kernels call when they wait for another work-group, with the number of rounds so far; and their clock, in nanoseconds. */
+void qp_host_wait(uint32_t round);
 uint64_t qp_host_clock(void);
 
 /* Builds by instruction set, by qp_precision; the second one exists on x86-64 only. */
