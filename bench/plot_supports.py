@@ -136,7 +136,8 @@ def draw_ring(result):
     m = result["machine"]
     figure.suptitle("%s, %s: %d SM x %d warps, retirement %s" % (
         os.path.splitext(result["mesh"])[0],
-        "factor %g" % result["tess"] if "tess" in result else "tolerance %g" % result["tolerance"],
+        "tolerance %g" % result["tolerance"] if "tolerance" in result else
+        "factor %g" % result["tess"] if result["tess"] else "random factors",
         m["sm"], m["warps_per_sm"], m["retirement"].replace("-", " ")), y=0.985, fontsize=12)
     figure.subplots_adjust(left=0.055, right=0.99, top=0.86, bottom=0.125, wspace=0.22)
     return figure

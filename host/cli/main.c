@@ -4,10 +4,9 @@
 #include <errno.h>
 #include <string.h>
 
-static const cli_command *const commands[] = {&cli_info,   &cli_gen,        &cli_eval,
-                                              &cli_error,  &cli_watertight, &cli_sample,
-                                              &cli_stress, &cli_render,     &cli_ring,
-                                              &cli_devices, &cli_bench};
+static const cli_command *const commands[] = {&cli_info,       &cli_gen,    &cli_eval,    &cli_error,
+                                              &cli_watertight, &cli_sample, &cli_stress,  &cli_render,
+                                              &cli_ring,       &cli_cache,  &cli_devices, &cli_bench};
 enum { N_COMMANDS = sizeof commands / sizeof commands[0] };
 
 static void usage(FILE *file) {

@@ -124,6 +124,7 @@ static qp_status measure(const char *argument, const ring_options *o, const uint
     qp_status status = cli_views_open(argument, &o->views, views, err);
     if (status != QP_OK) return status;
     run->tessellation = &views->list[0].tessellation;
+    run->factor = views->list[0].factor;
     status = qp_patch_work_list(views->surface, run->tessellation, run->regular_points,
                                 o->issue == QP_ISSUE_BY_PLAN, &run->work, &run->n_work, err);
     if (status != QP_OK) return status;

@@ -29,6 +29,7 @@ typedef struct ring_validation {
 typedef struct ring_run {
     const char *name; /* of the mesh or scene */
     const qp_tessellation *tessellation;
+    double factor; /* 0: chosen within a tolerance, or at random */
     const char *machine_name;
     qp_machine machine;
     int issue;               /* index into CLI_ISSUE_ORDERS */

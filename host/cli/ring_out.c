@@ -190,10 +190,12 @@ void ring_write_json(const void *result, FILE *file) {
     qp_json json;
     qp_json_begin(&json, file);
     qp_json_text(&json, "mesh", base_name(run->name));
-    if (run->tessellation->tolerance != 0)
+    if (run->factor != 0)
+        qp_json_real(&json, "tess", run->factor);
+    else if (run->tessellation->tolerance != 0)
         qp_json_real(&json, "tolerance", run->tessellation->tolerance);
     else
-        qp_json_real(&json, "tess", (double)run->tessellation->factor);
+        qp_json_text(&json, "tess", NULL);
     write_machine(run, &json);
     qp_json_integer(&json, "patches", run->n_work);
     qp_json_integer(&json, "patches_with_points", run->with_points);

@@ -34,6 +34,7 @@ static qp_status open_scene(const char *path, const cli_views_options *o, cli_vi
         cli_view *view = &views->list[i];
         override(o, scene);
         view->name = scene->name;
+        view->factor = scene->random_factors || scene->tolerance != 0 ? 0 : scene->factor;
         status = qp_scene_tessellation(scene, views->mesh, &view->tessellation, &view->factors, err);
     }
     return status;
@@ -46,6 +47,7 @@ static qp_status open_mesh(const char *argument, const cli_views_options *o, cli
     views->list = qp_alloc(1, sizeof *views->list, true);
     if (views->list == NULL) return qp_fail_memory(err, sizeof *views->list, "a view");
     views->count = 1;
+    views->list[0].factor = o->tolerance != 0 ? 0 : o->tess;
     const bool largest = o->tolerance != 0 && !o->tess_given;
     views->list[0].tessellation = (qp_tessellation){.spacing = (qp_spacing)o->spacing,
                                                     .factor = largest ? 64 : (float)o->tess,

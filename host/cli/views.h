@@ -7,6 +7,7 @@
 
 typedef struct cli_view {
     const char *name; /* of a scene's pass, or NULL */
+    double factor;    /* as asked for; 0: chosen within a tolerance, or at random */
     qp_tessellation tessellation;
     float *factors; /* that it points to, or NULL */
 } cli_view;
