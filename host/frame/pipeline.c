@@ -408,10 +408,11 @@ qp_status qp_pipeline_smallest_ring(const qp_patch_work *work, size_t count, con
     qp_status status = qp_pipeline_run(work, count, machine, 0, &result, NULL, err);
     if (status != QP_OK) return status;
     const double scratch = result.cycles;
+    const uint64_t all = result.allocated_bytes;
     /* In steps: `low` is too small; `high` holds all patches at once, so that nothing is ever skipped or waited for. */
     const uint64_t largest = qp_pipeline_largest_bytes(work, count, machine);
     if (largest == 0) return QP_OK;
-    uint64_t low = (largest - 1) / step, high = result.allocated_bytes / step + 1;
+    uint64_t low = (largest - 1) / step, high = all / step + 1;
     while (high - low > 1) {
         const uint64_t middle = low + (high - low) / 2;
         status = qp_pipeline_run(work, count, machine, middle * step, &result, NULL, err);
@@ -421,6 +422,6 @@ qp_status qp_pipeline_smallest_ring(const qp_patch_work *work, size_t count, con
         else
             low = middle;
     }
-    *ring_bytes = high * step;
+    *ring_bytes = high * step < all ? high * step : all;
     return QP_OK;
 }

@@ -95,7 +95,7 @@ qp_status qp_pipeline_run(const qp_patch_work *work, size_t count, const qp_mach
                           uint64_t ring_bytes, qp_pipeline_result *result, qp_patch_times *times,
                           qp_error *err);
 
-/* A ring, a multiple of `step` bytes, with at least `share` (0 to 1) of the throughput of unlimited scratch, while one that is a step smaller
+/* A ring, a multiple of `step` bytes or as large as all patches together, with at least `share` (0 to 1) of the throughput of unlimited scratch, while one that is a step smaller
  * has less or cannot hold the largest patch. Found by bisection, so that it is the smallest one where throughput grows with the ring; where
  * it wavers (a place that is skipped may come at a better or worse time) there may be smaller ones. 0 where no patch needs a ring. Errors: as qp_pipeline_run. */
 qp_status qp_pipeline_smallest_ring(const qp_patch_work *work, size_t count, const qp_machine *machine,

@@ -24,7 +24,7 @@ value 'abs(o["rows"][1]["relative_throughput"] - 1 / 6) < 1e-6 and abs(o["rows"]
 value '[r["in_flight"] for r in o["rows"]] == [0, 1, 1, 2, 3, 4, 6, 6]'
 value '[r["peak_bytes"] for r in o["rows"]] == [3792 * r["in_flight"] for r in o["rows"]]'
 value 'o["rows"][-1]["relative_throughput"] == 1 and o["rows"][-1]["stall_fraction"] == 0'
-value 'o["smallest_ring_bytes_at_99_percent"] == 23 * 1024'
+value 'o["smallest_ring_bytes_at_99_percent"] == 6 * 3792'
 value 'sum(o["histogram"]["patches"]) == 6 and o["histogram"]["patches"][237 // o["histogram"]["points_per_bin"]] == 6'
 value 'max(o["live"][0]["bytes"]) == 6 * 3792 == o["scratch"]["peak_bytes"]'
 cp "$work/stdout" "$work/rows.json"

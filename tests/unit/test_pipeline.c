@@ -181,6 +181,10 @@ static void smallest_rings(void) {
     CHECK(bytes == 1000);
     CHECK_OK(qp_pipeline_smallest_ring(work, 120, &m, 0.0, POINT, &bytes, &err), err);
     CHECK(bytes == 8 * POINT);
+    CHECK_OK(qp_pipeline_smallest_ring(work, 120, &m, 1.0, 1000, &bytes, &err), err);
+    CHECK(bytes == 2000);
+    CHECK_OK(qp_pipeline_smallest_ring(work, 5, &m, 1.0, 1000, &bytes, &err), err);
+    CHECK(bytes == 5 * 8 * POINT); /* all of them */
     set_all(work, 120, 0, 3);
     CHECK_OK(qp_pipeline_smallest_ring(work, 120, &m, 1.0, POINT, &bytes, &err), err);
     CHECK(bytes == 0);
