@@ -358,6 +358,47 @@ QP_API qp_status qp_frame_eval(qp_frame *frame, const qp_tessellation *tessellat
 QP_API qp_status qp_frame_eval_points(qp_frame *frame, uint64_t count, const uint32_t *patch,
                                       const double *uv, qp_stream *stream, qp_error *err);
 
+/* A piece of a vertex stream: the samples of some patches that follow each other. */
+typedef struct qp_chunk {
+    uint64_t first_sample, first_triangle; /* of the whole stream */
+    uint32_t first_patch, n_patches;
+    qp_stream stream; /* the piece; triangles count its samples from 0; it has no hash. Its arrays live until the consumer returns */
+} qp_chunk;
+
+/* Takes one piece; anything but QP_OK ends the evaluation with that status, and with the message in *err, if it is filled in. */
+typedef qp_status (*qp_chunk_consumer)(void *context, const qp_chunk *chunk, qp_error *err);
+
+/* What an evaluation in pieces came to. */
+typedef struct qp_chunks {
+    qp_stream stream; /* sums over the pieces (of what is held at one time, the most), the hash of the whole where asked for, no arrays */
+    uint64_t n_chunks;
+    uint64_t n_ghosts;          /* samples of patches of other pieces that were evaluated once more, all together */
+    uint64_t peak_vertex_bytes; /* most that one piece had, ghosts included, derivatives apart */
+    double set_up_ms;           /* laying out all pieces, factors and deeper plans included */
+    double consumer_ms;         /* the consumer and the hash */
+} qp_chunks;
+
+/* qp_frame_eval for streams that need not be held whole: the same samples in the same order and with the same bits, handed to the
+ * consumer (NULL: to none) in pieces of whole patches, of at most chunk_bytes of vertices each. At any time there is one piece: its
+ * vertices, ghosts (those of a piece's perimeter that other patches own) and, for each of its samples, 13 bytes, with triangles and
+ * derivatives some 24 more each; its supports as the frame's options have them; and, beside mesh and surface, few bytes a face and edge.
+ * What qp_frame_eval made before is freed. *sum, which may be NULL, is filled in as far as the evaluation came, also on failure. Errors:
+ * as qp_frame_eval; QP_BAD_INPUT, before any piece is made, where a patch alone has more than chunk_bytes. */
+QP_API qp_status qp_frame_eval_chunks(qp_frame *frame, const qp_tessellation *tessellation,
+                                      uint64_t chunk_bytes, qp_chunk_consumer consumer, void *context,
+                                      qp_chunks *sum, qp_error *err);
+
+/* Hash of a vertex stream that comes in pieces, each a number of bytes of vertices: what qp_stream.hash has of the whole. Takes
+ * 1 MiB, and 8 bytes more for each MiB it was given. */
+typedef struct qp_stream_hasher qp_stream_hasher;
+QP_API qp_status qp_stream_hasher_create(qp_stream_hasher **hasher, qp_error *err);
+QP_API void qp_stream_hasher_free(qp_stream_hasher *hasher);
+/* Errors: QP_SYSTEM for memory; nothing was added then. */
+QP_API qp_status qp_stream_hasher_add(qp_stream_hasher *hasher, const void *bytes, size_t length,
+                                      qp_error *err);
+/* Of what was added so far. */
+QP_API uint64_t qp_stream_hasher_value(const qp_stream_hasher *hasher);
+
 #ifdef __cplusplus
 }
 #endif

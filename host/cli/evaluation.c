@@ -8,7 +8,7 @@ qp_status cli_evaluation_open(const char *argument, const cli_evaluation_options
     qp_surface_options surface_options = {.depth = (uint32_t)options->depth};
     qp_frame_options frame_options = {
         .precision = (qp_precision)options->precision,
-        .want_triangles = want_triangles,
+        .want_triangles = want_triangles && !options->no_triangles,
         .want_hash = want_triangles,
         .want_derivatives = options->derivatives,
         .no_regular_pass = options->no_regular_pass,

@@ -12,7 +12,7 @@ typedef struct cli_evaluation_options {
     uint64_t depth;         /* 0: the library's default */
     const char *device;     /* NULL: the library's default */
     bool no_regular_pass, no_sharing, no_exact_tail;
-    bool derivatives; /* set by the subcommand */
+    bool derivatives, no_triangles; /* set by the subcommand */
     cli_supports_options supports;
 } cli_evaluation_options;
 

@@ -71,6 +71,16 @@ qp_status qp_frame_create(qp_device *device, const qp_surface *surface, const qp
     return QP_OK;
 }
 
+void qp_frame_drop_stream(qp_frame *frame) {
+    free(frame->vertices);
+    free(frame->flags);
+    free(frame->derivatives);
+    free(frame->ordered);
+    frame->vertices = frame->derivatives = frame->ordered = NULL;
+    frame->flags = NULL;
+    frame->vertex_bytes = frame->flag_bytes = frame->derivative_bytes = frame->ordered_bytes = 0;
+}
+
 void qp_frame_free(qp_frame *frame) {
     if (frame == NULL) return;
     qp_frame_drop_layout(frame);
@@ -85,10 +95,7 @@ void qp_frame_free(qp_frame *frame) {
     free(frame->patch_factors);
     free(frame->edge_factors);
     qp_share_free(frame->share);
-    free(frame->vertices);
-    free(frame->flags);
-    free(frame->derivatives);
-    free(frame->ordered);
+    qp_frame_drop_stream(frame);
     free(frame);
 }
 
@@ -155,36 +162,17 @@ static void order_samples(void *context, size_t begin, size_t end, unsigned work
     }
 }
 
-enum { HASH_BLOCK = 1 << 20 };
-
-typedef struct hash_job {
-    const char *bytes;
-    size_t length;
-    uint64_t *hashes;
-} hash_job;
-
-static void hash_blocks(void *context, size_t begin, size_t end, unsigned worker) {
-    const hash_job *job = context;
-    (void)worker;
-    for (size_t b = begin; b < end; ++b) {
-        size_t at = b * (size_t)HASH_BLOCK, left = job->length - at;
-        job->hashes[b] = qp_hash(job->bytes + at, left < HASH_BLOCK ? left : HASH_BLOCK, b);
-    }
-}
-
-/* Hash of the hashes of blocks of a megabyte, so that threads can share the work. */
+/* Its hash (stream_hash.c). */
 static qp_status hash_stream(const void *bytes, size_t length, uint64_t *hash, qp_error *err) {
-    const size_t blocks = length / HASH_BLOCK + (length % HASH_BLOCK != 0);
-    hash_job job = {bytes, length, qp_alloc(blocks, sizeof(uint64_t), false)};
-    if (job.hashes == NULL) return qp_fail_memory(err, blocks * sizeof(uint64_t), "hashes");
-    qp_parallel(blocks, 1, hash_blocks, &job);
-    *hash = qp_hash(job.hashes, blocks * sizeof(uint64_t), length);
-    free(job.hashes);
-    return QP_OK;
+    qp_stream_hasher *hasher;
+    qp_status status = qp_stream_hasher_create(&hasher, err);
+    if (status == QP_OK) status = qp_stream_hasher_add(hasher, bytes, length, err);
+    if (status == QP_OK) *hash = qp_stream_hasher_value(hasher);
+    qp_stream_hasher_free(hasher);
+    return status;
 }
 
-/* Evaluates the layout that is uploaded. */
-static qp_status evaluate(qp_frame *frame, qp_stream *stream, qp_error *err) {
+qp_status qp_frame_evaluate(qp_frame *frame, bool want_hash, qp_stream *stream, qp_error *err) {
     const qp_frame_layout *layout = &frame->layout;
     const size_t sample_bytes = 6 * frame->real_size;
     *stream = (qp_stream){.precision = frame->options.precision,
@@ -227,7 +215,7 @@ static qp_status evaluate(qp_frame *frame, qp_stream *stream, qp_error *err) {
     }
     stream->frame_ms = qp_now_ms() - start;
     frame->processor_ms = qp_processor_ms() - processor_start;
-    if (status == QP_OK && frame->options.want_hash)
+    if (status == QP_OK && want_hash)
         status = hash_stream(stream->vertices, (size_t)layout->n_samples * sample_bytes, &stream->hash, err);
     if (status != QP_OK) *stream = (qp_stream){0};
     return status;
@@ -258,9 +246,11 @@ static qp_status keep_factors(float **copy, const float *factors, size_t n, qp_e
     return QP_OK;
 }
 
-/* The factors of a tolerance in *edges, malloced. */
-static qp_status factors_within(qp_frame *frame, const qp_tessellation *tessellation, float **edges, qp_error *err) {
+qp_status qp_frame_factors_within(qp_frame *frame, const qp_tessellation *tessellation, float **edges, qp_error *err) {
     const size_t n_edges = frame->surface->mesh->n_edges;
+    frame->tolerance = (qp_tolerance_report){0};
+    *edges = NULL;
+    if (!has_tolerance(tessellation)) return QP_OK;
     *edges = qp_alloc(n_edges, sizeof **edges, false);
     if (*edges == NULL) return qp_fail_memory(err, n_edges * sizeof **edges, "tessellation factors");
     return qp_tolerance_factors(frame->surface, tessellation, frame->options.precision, *edges, &frame->tolerance,
@@ -279,12 +269,8 @@ static qp_status set_up(qp_frame *frame, const qp_tessellation *tessellation, qp
     frame->tessellation.edge_factors = frame->edge_factors;
     qp_tessellation chosen = *tessellation;
     float *edges = NULL;
-    qp_status status = QP_OK;
-    frame->tolerance = (qp_tolerance_report){0};
-    if (has_tolerance(tessellation)) {
-        status = factors_within(frame, tessellation, &edges, err);
-        chosen.edge_factors = edges;
-    }
+    qp_status status = qp_frame_factors_within(frame, tessellation, &edges, err);
+    if (edges != NULL) chosen.edge_factors = edges;
     if (status == QP_OK)
         status = qp_layout_tessellate(frame->surface, &chosen, frame->share, frame->options.want_triangles,
                                       &frame->layout, err);
@@ -298,6 +284,14 @@ static qp_status set_up(qp_frame *frame, const qp_tessellation *tessellation, qp
     return status;
 }
 
+void qp_frame_report_tolerance(const qp_frame *frame, qp_stream *stream) {
+    stream->bound = frame->tolerance.bound;
+    stream->over_tolerance = frame->tolerance.over;
+    stream->factor_min = frame->tolerance.factor_min;
+    stream->factor_mean = frame->tolerance.factor_mean;
+    stream->factor_max = frame->tolerance.factor_max;
+}
+
 qp_status qp_frame_eval(qp_frame *frame, const qp_tessellation *tessellation, qp_stream *stream,
                         qp_error *err) {
     *stream = (qp_stream){0};
@@ -305,14 +299,9 @@ qp_status qp_frame_eval(qp_frame *frame, const qp_tessellation *tessellation, qp
         qp_status status = set_up(frame, tessellation, err);
         if (status != QP_OK) return status;
     }
-    qp_status status = evaluate(frame, stream, err);
-    if (status != QP_OK) return status;
-    stream->bound = frame->tolerance.bound;
-    stream->over_tolerance = frame->tolerance.over;
-    stream->factor_min = frame->tolerance.factor_min;
-    stream->factor_mean = frame->tolerance.factor_mean;
-    stream->factor_max = frame->tolerance.factor_max;
-    return QP_OK;
+    qp_status status = qp_frame_evaluate(frame, frame->options.want_hash != 0, stream, err);
+    if (status == QP_OK) qp_frame_report_tolerance(frame, stream);
+    return status;
 }
 
 qp_status qp_frame_eval_points(qp_frame *frame, uint64_t count, const uint32_t *patch, const double *uv,
@@ -323,7 +312,7 @@ qp_status qp_frame_eval_points(qp_frame *frame, uint64_t count, const uint32_t *
     if (status == QP_OK) status = qp_frame_deepen(frame, true, err);
     if (status == QP_OK) status = qp_frame_upload_layout(frame, err);
     if (status == QP_OK) {
-        status = evaluate(frame, stream, err);
+        status = qp_frame_evaluate(frame, frame->options.want_hash != 0, stream, err);
         if (status == QP_OK && frame->options.tolerance != 0 && !frame->options.no_exact_tail)
             stream->bound = frame->light_bound;
         return status;

@@ -82,6 +82,10 @@ qp_frame_plan qp_frame_plan_of(const qp_frame *frame, uint32_t patch);
 /* Chooses the plans for the layout's samples (of points: within the tolerance of the options, if any), makes deeper ones where they are needed, and uploads what is new. To be called for
  * every layout before qp_frame_upload_layout. */
 qp_status qp_frame_deepen(qp_frame *frame, bool points, qp_error *err);
+/* The same in pieces: begin; add every layout of the evaluation (as frame->layout), none of which is uploaded; end. */
+qp_status qp_frame_begin_steps(qp_frame *frame, qp_error *err);
+qp_status qp_frame_add_steps(qp_frame *frame, qp_error *err);
+qp_status qp_frame_end_steps(qp_frame *frame, qp_error *err);
 /* Level to which the plans of a step go, 1 .. QP_PLAN_STEPS. */
 uint32_t qp_step_level(uint8_t step);
 /* Makes frame->deep[step - 1] hold every patch whose patch_step is `step`; sets *changed when it did not before. */
@@ -114,6 +118,14 @@ qp_status qp_frame_upload_layout(qp_frame *frame, qp_error *err);
 /* What is known before the kernels run of an evaluation of the layout that is uploaded, and holds for scratch; of other kinds, those
  * who evaluate them put in what differs. */
 qp_supports_report qp_frame_scratch_report(const qp_frame *frame);
+/* Evaluates the layout that is uploaded. */
+qp_status qp_frame_evaluate(qp_frame *frame, bool want_hash, qp_stream *stream, qp_error *err);
+/* The factors of a tolerance in *edges, malloced, and in frame->tolerance what is known of them; NULL without one. */
+qp_status qp_frame_factors_within(qp_frame *frame, const qp_tessellation *tessellation, float **edges, qp_error *err);
+/* Puts that into a stream. */
+void qp_frame_report_tolerance(const qp_frame *frame, qp_stream *stream);
+/* Frees the stream's memory; no layout may be uploaded. */
+void qp_frame_drop_stream(qp_frame *frame);
 /* Frees what qp_frame_upload_layout made, buffers that can be used again apart. */
 void qp_frame_drop_layout(qp_frame *frame);
 

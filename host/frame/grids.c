@@ -52,14 +52,15 @@ typedef struct grid_job {
     int failed;
 } grid_job;
 
-/* The points on the rim, which come first and run around counter-clockwise, whole patches assumed. */
+/* The points on the rim, which come first and run around counter-clockwise, whole patches assumed. Points behind those may lie on the
+ * patch's edges as well, where an inner factor is 1; but a disc of P points with R of them on its rim has 2 P - 2 - R triangles. */
 static qp_rim find_rim(const qp_tess_grid *grid) {
-    qp_rim rim = {0};
-    for (; rim.count < grid->n_points; ++rim.count) {
-        const float u = grid->uv[2 * (size_t)rim.count], v = grid->uv[2 * (size_t)rim.count + 1];
-        const bool at_u = u == 0 || u == 1, at_v = v == 0 || v == 1;
-        if (!at_u && !at_v) break;
-        if (at_u && at_v) rim.corner[v == 0 ? (u == 0 ? 0 : 1) : (u == 0 ? 3 : 2)] = rim.count;
+    if (grid->n_points == 0) return (qp_rim){0};
+    qp_rim rim = {.count = 2 * grid->n_points - 2 - grid->n_triangles};
+    for (uint32_t i = 0; i < rim.count; ++i) {
+        const float u = grid->uv[2 * (size_t)i], v = grid->uv[2 * (size_t)i + 1];
+        if ((u == 0 || u == 1) && (v == 0 || v == 1))
+            rim.corner[v == 0 ? (u == 0 ? 0 : 1) : (u == 0 ? 3 : 2)] = i;
     }
     return rim;
 }

@@ -116,21 +116,10 @@ qp_status qp_frame_grow_step(qp_frame *frame, uint8_t step, bool *changed, qp_er
     return status;
 }
 
-qp_status qp_frame_deepen(qp_frame *frame, bool points, qp_error *err) {
+/* Raises patch_step to what the layout's samples need. */
+static qp_status add_steps(qp_frame *frame, const uint8_t *light, qp_error *err) {
     const qp_frame_layout *layout = &frame->layout;
-    const uint32_t n_patches = frame->surface->mesh->n_patches;
-    if (frame->options.no_exact_tail) return QP_OK;
-    if (frame->patch_step == NULL && (frame->patch_step = qp_alloc(n_patches, 1, false)) == NULL)
-        return qp_fail_memory(err, n_patches, "deeper plans");
-    bool changed = false;
-    const bool light = points && frame->options.tolerance != 0;
-    qp_status status = light ? qp_frame_choose_light(frame, &changed, err) : QP_OK;
-    if (status != QP_OK) {
-        qp_frame_drop_deep(frame);
-        return status;
-    }
-    memset(frame->patch_step, 0, n_patches);
-    depth_job job = {frame, light ? frame->light : NULL, qp_alloc(layout->n_items, 1, false)};
+    depth_job job = {frame, light, qp_alloc(layout->n_items, 1, false)};
     if (job.steps == NULL) return qp_fail_memory(err, layout->n_items, "deeper plans");
     qp_parallel(layout->n_items, 16, find_steps, &job);
     for (size_t i = 0; i < layout->n_items; ++i) {
@@ -138,9 +127,52 @@ qp_status qp_frame_deepen(qp_frame *frame, bool points, qp_error *err) {
         if (job.steps[i] > *step) *step = job.steps[i];
     }
     free(job.steps);
+    return QP_OK;
+}
+
+/* Makes the plans that patch_step asks for. */
+static qp_status grow_steps(qp_frame *frame, bool changed, qp_error *err) {
+    qp_status status = QP_OK;
     for (uint8_t step = 1; step <= QP_DEEP_STEPS && status == QP_OK; ++step)
         status = qp_frame_grow_step(frame, step, &changed, err);
     if (status == QP_OK && (changed || !frame->plans_uploaded)) status = qp_frame_upload_plans(frame, err);
+    return status;
+}
+
+static qp_status clear_steps(qp_frame *frame, qp_error *err) {
+    const uint32_t n_patches = frame->surface->mesh->n_patches;
+    if (frame->patch_step == NULL) frame->patch_step = qp_alloc(n_patches, 1, false);
+    if (frame->patch_step == NULL) return qp_fail_memory(err, n_patches, "deeper plans");
+    memset(frame->patch_step, 0, n_patches);
+    return QP_OK;
+}
+
+qp_status qp_frame_deepen(qp_frame *frame, bool points, qp_error *err) {
+    const bool light = points && frame->options.tolerance != 0;
+    bool changed = false;
+    if (frame->options.no_exact_tail) return QP_OK;
+    qp_status status = clear_steps(frame, err);
+    if (status == QP_OK && light) {
+        status = qp_frame_choose_light(frame, &changed, err);
+        if (status == QP_OK) status = clear_steps(frame, err);
+    }
+    if (status == QP_OK) status = add_steps(frame, light ? frame->light : NULL, err);
+    if (status == QP_OK) status = grow_steps(frame, changed, err);
+    if (status != QP_OK) qp_frame_drop_deep(frame);
+    return status;
+}
+
+qp_status qp_frame_begin_steps(qp_frame *frame, qp_error *err) {
+    return frame->options.no_exact_tail ? QP_OK : clear_steps(frame, err);
+}
+
+qp_status qp_frame_add_steps(qp_frame *frame, qp_error *err) {
+    return frame->options.no_exact_tail ? QP_OK : add_steps(frame, NULL, err);
+}
+
+qp_status qp_frame_end_steps(qp_frame *frame, qp_error *err) {
+    if (frame->options.no_exact_tail) return QP_OK;
+    qp_status status = grow_steps(frame, false, err);
     if (status != QP_OK) qp_frame_drop_deep(frame);
     return status;
 }

@@ -94,23 +94,31 @@ static qp_status generate_cubes(mesh_builder *b, const qp_generate_options *opti
 
 /* ---- Tori ---- */
 
-/* n[0] quads around the axis, n[1] around the tube (24 x 12). A sharpness above 0 creases the top ring. */
-static qp_status add_torus(mesh_builder *b, const qp_generate_options *options, double sharpness,
-                           qp_error *err) {
-    uint32_t around, tube;
-    qp_status status = generate_size(options, 0, 24, 3, 20000, "torus: quads around the axis", &around, err);
+/* Vertices of n[0] quads around the axis, n[1] around the tube (24 x 12). */
+static qp_status torus_vertices(mesh_builder *b, const qp_generate_options *options, uint32_t *around, uint32_t *tube,
+                                qp_error *err) {
+    qp_status status = generate_size(options, 0, 24, 3, 20000, "torus: quads around the axis", around, err);
     if (status == QP_OK)
-        status = generate_size(options, 1, 12, 3, 20000, "torus: quads around the tube", &tube, err);
+        status = generate_size(options, 1, 12, 3, 20000, "torus: quads around the tube", tube, err);
     if (status != QP_OK) return status;
-    for (uint32_t i = 0; i < around; ++i) {
+    for (uint32_t i = 0; i < *around; ++i) {
         double x, y;
-        generate_circle((double)i / around, &x, &y);
-        for (uint32_t j = 0; j < tube; ++j) {
+        generate_circle((double)i / *around, &x, &y);
+        for (uint32_t j = 0; j < *tube; ++j) {
             double r, z;
-            generate_circle((double)j / tube, &r, &z);
+            generate_circle((double)j / *tube, &r, &z);
             builder_vertex(b, (1 + 0.4 * r) * x, (1 + 0.4 * r) * y, 0.4 * z);
         }
     }
+    return QP_OK;
+}
+
+/* A sharpness above 0 creases the top ring. */
+static qp_status add_torus(mesh_builder *b, const qp_generate_options *options, double sharpness,
+                           qp_error *err) {
+    uint32_t around, tube;
+    qp_status status = torus_vertices(b, options, &around, &tube, err);
+    if (status != QP_OK) return status;
     const uint32_t top = tube / 4;
     for (uint32_t i = 0; i < around; ++i) {
         const uint32_t here = i * tube, next = (i + 1) % around * tube;
@@ -119,6 +127,36 @@ static qp_status add_torus(mesh_builder *b, const qp_generate_options *options, 
             builder_quad(b, here + j, next + j, next + up, here + up);
         }
         if (sharpness > 0) builder_crease(b, here + top, next + top, (float)sharpness);
+    }
+    return QP_OK;
+}
+
+/* One torus of n[0] x n[1] cells (24 x 12), each cut into two triangles along either diagonal, as the seed has it: no patch is regular,
+ * and vertices have valences 4 to 8. Cells come in tiles of TILE x TILE, so that patches near each other have numbers near each other. */
+enum { TILE = 8 };
+
+static void add_triangles(mesh_builder *b, uint32_t around, uint32_t tube, uint32_t i, uint32_t j, bool falling) {
+    const uint32_t next = (i + 1) % around, up = (j + 1) % tube;
+    const uint32_t quad[4] = {i * tube + j, next * tube + j, next * tube + up, i * tube + up};
+    const uint32_t first[2][3] = {{quad[0], quad[1], quad[2]}, {quad[0], quad[1], quad[3]}};
+    const uint32_t second[2][3] = {{quad[0], quad[2], quad[3]}, {quad[1], quad[2], quad[3]}};
+    builder_face(b, 3, first[falling]);
+    builder_face(b, 3, second[falling]);
+}
+
+static qp_status generate_irregular(mesh_builder *b, const qp_generate_options *options, qp_error *err) {
+    uint32_t around, tube;
+    qp_status status = torus_vertices(b, options, &around, &tube, err);
+    qp_random random = {options->seed};
+    if (status != QP_OK) return status;
+    if ((uint64_t)around * tube > 100000000) return qp_fail(err, QP_BAD_INPUT, "irregular: more than 10^8 cells");
+    for (uint32_t i = 0; i < around; i += TILE) {
+        for (uint32_t j = 0; j < tube; j += TILE) {
+            const uint32_t end_i = around - i < TILE ? around : i + TILE, end_j = tube - j < TILE ? tube : j + TILE;
+            for (uint32_t x = i; x < end_i; ++x)
+                for (uint32_t y = j; y < end_j; ++y)
+                    add_triangles(b, around, tube, x, y, qp_random_below(&random, 2) != 0);
+        }
     }
     return QP_OK;
 }
@@ -206,7 +244,8 @@ qp_status qp_mesh_generate(const char *kind, const qp_generate_options *options,
         qp_status (*fill)(mesh_builder *, const qp_generate_options *, qp_error *);
     } fixed[] = {
         {"cube", generate_cube},   {"torus", generate_torus}, {"creased-torus", generate_creased_torus},
-        {"cubes", generate_cubes}, {"fan", generate_fan},     {"prism", generate_prism}};
+        {"cubes", generate_cubes}, {"fan", generate_fan},     {"prism", generate_prism},
+        {"irregular", generate_irregular}};
     static const qp_generate_options defaults = {.sharpness = -1};
     *mesh = NULL;
     if (options == NULL) options = &defaults;
@@ -224,6 +263,6 @@ qp_status qp_mesh_generate(const char *kind, const qp_generate_options *options,
     }
     return qp_fail(err, QP_BAD_INPUT,
                    "unknown kind of mesh \"%.40s\" (cube, torus, creased-torus, cubes, fan, prism, terrain, "
-                   "random-closed, random-open)",
+                   "irregular, random-closed, random-open)",
                    kind);
 }
