@@ -164,7 +164,7 @@ QP_FUNCTION void QP_NAME(eval_irregular)(__global const real4 *support, __global
 
 #if QP_WITH_CORNERS && QP_WITH_TERMINAL
 /* What remains at an extraordinary corner (0,0): exact there; elsewhere the doubling goes on in the terminal's last ring, by whose
- * ratio everything shrinks a level (plan_layout.h). `shrink` scales that ring's points; `rings` is their number. */
+ * ratio everything shrinks a level (plan_layout.h). `shrink` scales that ring's points; `rings` is their number and that of the levels before them. */
 QP_FUNCTION void QP_NAME(eval_extraordinary)(__global const real4 *support, __global const uint *node,
                                              __global const real *constants, __global const uint *ring,
                                              uint rings, uint origin, real shrink, real u, real v,
@@ -241,8 +241,10 @@ QP_FUNCTION void QP_NAME(eval_tree)(__global const uint *tree, __global const re
             __global const uint *ring = node + 3;
             QP_NAME(rotate_uv)(QP_NODE_ROTATION(word), &u, &v);
             s->turn += QP_NODE_ROTATION(word);
-            /* The points of ring k are offsets times 2^k, so that what the cells shrink by their slopes grow by. */
+            /* The points of ring k are offsets times 2^(start + k), so that what the cells shrink by their slopes grow by. */
+            const uint start = QP_NODE_START(word);
             real shrink = QP_R(1.0);
+            for (uint k = 0; k < start; ++k) shrink *= QP_R(0.5);
             for (uint k = 0; k < rings; ++k, ring += 12, shrink *= QP_R(0.5)) {
                 if (QP_NAME(is_upper)(u, 1u) != 0 || QP_NAME(is_upper)(v, 1u) != 0) {
                     QP_NAME(eval_ring)(support, ring, u, v, orders, s);
@@ -251,7 +253,7 @@ QP_FUNCTION void QP_NAME(eval_tree)(__global const uint *tree, __global const re
                     if ((word & QP_NODE_MODE) != 0)
                         QP_NAME(add_mode)(support[(tree + node[2])[5]], orders, s);
                     if (orders != 0) return;
-                    s->level -= (int)k;
+                    s->level -= (int)(start + k);
                     s->p = fma4(s->p, shrink, support[origin]);
                     return;
                 }
@@ -261,7 +263,7 @@ QP_FUNCTION void QP_NAME(eval_tree)(__global const uint *tree, __global const re
             }
 #if QP_WITH_CORNERS
             last_ring = rings == 0 ? 0 : ring - 12;
-            last_rings = rings;
+            last_rings = start + rings;
             last_origin = rings <= absolute ? QP_NO_POINT : origin;
             last_shrink = last_origin == QP_NO_POINT ? QP_R(1.0) : QP_R(2.0) * shrink;
 #endif

@@ -17,7 +17,7 @@
  * origin afterwards (host/plan/anchor.c). With QP_PLAN_ANCHORS set, 4 bits a point, eight points a word, low bits first, hold the
  * corner 0..3 and that flag. Weights of a row sum
  * to 1, or to 0 for tangents and for *offset* rows: the points of a terminal node are stored as offsets from
- * the limit position of its corner (point ORIGIN), those of its ring number k times 2^k, so that they keep full
+ * the limit position of its corner (point ORIGIN), those of its ring number k times 2^(start + k), so that they keep full
  * relative precision however deep they lie.
  *
  * (u,v) of a plan: patches that share a plan by rotation r (0..3) put the plan's corner 0 at their own corner
@@ -49,8 +49,9 @@
 #define QP_PLAN_MODES 64u /* has points with shares in modes: behind the weights come P reals, the points' fourth numbers */
 
 /* Word 0 of a node: kind in bits 0..2, rotation in bits 3..4 (crease, terminal, extraordinary), tie_u in bit 5,
- * tie_v in bit 6 (internal); of a terminal the count of its rings in bits 8..15 and in bits 16..23 how many of them,
- * the first ones, have absolute points.
+ * tie_v in bit 6 (internal); of a terminal the count of its rings in bits 8..15, in bits 16..23 how many of them,
+ * the first ones, have absolute points, and in bits 25..31 its start, the subdivision level of its cell (of the mesh: one more than that of
+ * the patch for an n-gon's child), so that a point has the same scale in all patches.
  * Node-local (u,v) runs over [0,1]^2 in every node; going down doubles it (exactly). Rotation r turns the node's
  * (u,v) as the patch rotation above does, so that the crease edge is v=0 / the extraordinary corner is (0,0).
  * Point indices are 16 bits, two a word, low half first.
@@ -94,6 +95,7 @@
 #define QP_NODE_ABSOLUTE_RINGS(w) (((w) >> 16) & 255u)
 #define QP_NODE_EXACT (1u << 8) /* extraordinary */
 #define QP_NODE_MODE (1u << 24) /* terminal */
+#define QP_NODE_START(w) ((w) >> 25) /* terminal */
 
 #define QP_ANCHOR_CORNER(a) ((a)&3u)
 #define QP_ANCHOR_MOVES 4u

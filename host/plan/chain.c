@@ -4,11 +4,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Marks a ring's point as an offset from `origin`. A ring shrinks by about half a level, so ring number k is handed to a device
- * times 2^k: its weights stay near 1, where floats are normal numbers, however deep it lies. */
-static void make_offset(qp_builder *b, uint32_t point, uint32_t origin, uint32_t ring) {
+/* Marks a ring's point as an offset from `origin`. A ring shrinks by about half a level, so one in a cell of level k is handed to a
+ * device times 2^k: its weights stay near 1, where floats are normal numbers, however deep it lies. Levels are the mesh's, so
+ * that all patches around a corner have the same numbers. */
+static void make_offset(qp_builder *b, uint32_t point, uint32_t origin, uint32_t level) {
     b->points[point].origin = (uint16_t)origin;
-    b->points[point].scale = (uint8_t)ring;
+    b->points[point].scale = (uint8_t)level;
     qp_plan_lower_need(b, origin, b->points[point].need);
 }
 
@@ -18,7 +19,8 @@ static uint32_t put_terminal(qp_builder *b, const qp_chain *chain, uint32_t orig
     uint32_t node = qp_plan_new_node(b, 3 + 12 * chain->rings);
     if (b->failed) return QP_NONE;
     b->flags |= QP_PLAN_TERMINAL;
-    b->tree[node] = QP_NODE_TERMINAL | chain->corner << 3 | chain->rings << 8 | chain->absolute_rings << 16;
+    b->tree[node] = QP_NODE_TERMINAL | chain->corner << 3 | chain->rings << 8 | chain->absolute_rings << 16 |
+                    chain->start << 25;
     b->tree[node + 1] = origin;
     uint32_t width = b->local.width;
     for (uint32_t ring = 0; ring < chain->rings; ++ring) {
@@ -33,7 +35,7 @@ static uint32_t put_terminal(qp_builder *b, const qp_chain *chain, uint32_t orig
             bool seen = false;
             for (uint32_t l = 0; l < k && !seen; ++l) seen = chain->points[ring][l] == chain->points[ring][k];
             if (seen) continue;
-            make_offset(b, chain->points[ring][k], origin, ring);
+            make_offset(b, chain->points[ring][k], origin, chain->start + ring);
             double *row = qp_plan_final_row(b, chain->points[ring][k]);
             for (uint32_t w = 0; w < width; ++w) row[w] -= base[w];
         }
@@ -128,6 +130,7 @@ void qp_plan_go_on_chain(qp_builder *b, uint32_t level, const qp_item *item, qp_
         b->chains[index] = (qp_chain){.parent_word = item->parent_word,
                                       .corner = corner,
                                       .offset_ring = QP_DEPTH_LIMIT,
+                                      .start = level,
                                       .corner_u = qp_plan_corner_high_u(corner) ? item->u.hi : item->u.lo,
                                       .corner_v = qp_plan_corner_high_v(corner) ? item->v.hi : item->v.lo};
     }
@@ -245,7 +248,7 @@ static void add_tail_rings(qp_builder *b, uint32_t level, const qp_item *item, q
         uint32_t ring = chain->rings;
         add_ring(b, tail, level + 1, &at, children, chain);
         if (b->failed || b->too_large) break;
-        for (uint32_t k = 0; k < 24; ++k) make_offset(b, chain->points[ring][k], origin, ring);
+        for (uint32_t k = 0; k < 24; ++k) make_offset(b, chain->points[ring][k], origin, chain->start + ring);
         at = qp_plan_child_item(&at, children, chain->corner, tie_u, tie_v);
     }
     free(mask);

@@ -22,13 +22,22 @@ static void put_real(qp_precision precision, void *reals, size_t at, double x) {
         ((float *)reals)[at] = fabs(x) < (double)FLT_MIN ? 0.0f : (float)x;
 }
 
+/* What is smaller than this in a row of floats is no weight but the rounding error of a 0, which another plan that has the same
+ * point would have otherwise; 2^-32 of the largest weight is less than a hundredth of what rounding that one to a float changes. */
+static double smallest_weight(qp_precision precision, const double *row, uint32_t width) {
+    double largest = 0.0;
+    for (uint32_t j = 0; j < width; ++j) largest = fmax(largest, fabs(row[j]));
+    return precision == QP_FLOAT ? 0x1p-32 * largest : 0.0;
+}
+
 /* rest: scratch, [ring_size]. */
 static void pack_reals(const qp_plan *plan, qp_precision precision, void *reals, size_t at, double *rest) {
     const uint32_t rows = plan->point_count, width = plan->ring_size;
     for (uint32_t i = 0; i < rows; ++i) {
         const double *row = row_rest(plan, i, rest), scale = ldexp(1.0, plan->point_scales[i]);
+        const double least = smallest_weight(precision, row, width);
         for (uint32_t j = 0; j < width; ++j)
-            put_real(precision, reals, at + (size_t)j * rows + i, row[j] * scale);
+            put_real(precision, reals, at + (size_t)j * rows + i, fabs(row[j]) < least ? 0.0 : row[j] * scale);
         if ((plan->flags & QP_PLAN_MODES) != 0)
             put_real(precision, reals, at + (size_t)width * rows + i, plan->point_shares[i] * scale);
     }

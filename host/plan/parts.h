@@ -44,6 +44,7 @@ typedef struct qp_chain {
     uint32_t parent_word, corner, rings;
     uint32_t absolute_rings;             /* the first ones, whose points stay absolute */
     uint32_t offset_ring;                /* from this one on rows are offsets already */
+    uint32_t start;                      /* level of the cell that its first ring is in, of the mesh */
     uint64_t corner_u, corner_v;         /* of the patch, in units of 1 / QP_PLAN_ONE */
     uint32_t points[QP_DEPTH_LIMIT][24]; /* final points */
 } qp_chain;
