@@ -2,12 +2,11 @@
 #include "gl/program.h"
 
 #include <math.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { SHADOW_SIDE = 1024, BATCH = 1 << 17, SAMPLES = 4 };
+enum { SHADOW_SIDE = 1024, SAMPLES = 4 };
 
 enum { PLACE, FACING, MATERIAL, MAPS };
 static const GLenum map_formats[MAPS] = {GL_RGBA32F, GL_RGBA16F, GL_RGBA16F};
@@ -19,11 +18,9 @@ typedef struct drawing {
     bool shadowed;
     qp_lamp *lamps;
     double ground_centre[3], ground_u[3], ground_v[3]; /* of the ground's square */
-    GLuint shadow_program, surface_program, ground_program, shade_program;
-    GLuint points_array, corners_array, empty_array;
-    GLuint points, indices, corners; /* buffers */
-    GLuint shadows;                  /* texture array, one layer a light */
-    GLuint maps[MAPS];               /* multisampled textures: what geometry.frag.glsl writes */
+    GLuint ground_program, shade_program, empty_array;
+    GLuint shadows;    /* texture array, one layer a light */
+    GLuint maps[MAPS]; /* multisampled textures: what geometry.frag.glsl writes */
     GLuint shadow_target, geometry_target, target;
     GLuint depth, colour; /* renderbuffers */
 } drawing;
@@ -33,49 +30,13 @@ typedef struct drawing {
 static qp_status make_programs(drawing *d, qp_error *err) {
     char defines[64];
     snprintf(defines, sizeof defines, "#define LIGHTS %u\n", d->lights);
-    qp_gl_program_desc surface = {.vertex = "surface.vert.glsl", .fragment = "geometry.frag.glsl"};
     qp_gl_program_desc ground = {
         .vertex = "ground.vert.glsl", .fragment = "geometry.frag.glsl", .defines = "#define GROUND\n"};
     qp_gl_program_desc shade = {
         .vertex = "screen.vert.glsl", .fragment = "shade.frag.glsl", .defines = defines};
-    qp_gl_program_desc shadow = {.vertex = "shadow.vert.glsl", .fragment = "shadow.frag.glsl"};
-    qp_status status = qp_gl_make_program(d->gl, &surface, &d->surface_program, err);
-    if (status == QP_OK) status = qp_gl_make_program(d->gl, &ground, &d->ground_program, err);
+    qp_status status = qp_gl_make_program(d->gl, &ground, &d->ground_program, err);
     if (status == QP_OK) status = qp_gl_make_program(d->gl, &shade, &d->shade_program, err);
-    if (status == QP_OK) status = qp_gl_make_program(d->gl, &shadow, &d->shadow_program, err);
     return status;
-}
-
-static void attribute(qp_gl *gl, GLuint index, GLint size, GLenum type, size_t stride, size_t offset) {
-    QP_GL(gl, EnableVertexAttribArray(index));
-    QP_GL(gl, VertexAttribPointer(index, size, type, type == GL_UNSIGNED_BYTE, (GLsizei)stride,
-                                  (const void *)(uintptr_t)offset));
-}
-
-static void make_buffers(drawing *d) {
-    qp_gl *gl = d->gl;
-    QP_GL(gl, GenVertexArrays(1, &d->points_array));
-    QP_GL(gl, GenVertexArrays(1, &d->corners_array));
-    QP_GL(gl, GenVertexArrays(1, &d->empty_array));
-    QP_GL(gl, GenBuffers(1, &d->points));
-    QP_GL(gl, GenBuffers(1, &d->indices));
-    QP_GL(gl, GenBuffers(1, &d->corners));
-    if (d->shadowed) {
-        QP_GL(gl, BindVertexArray(d->points_array));
-        QP_GL(gl, BindBuffer(GL_ARRAY_BUFFER, d->points));
-        QP_GL(gl, BufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(d->in->n_points * 3 * sizeof(float)),
-                             d->in->positions, GL_STATIC_DRAW));
-        attribute(gl, 0, 3, GL_FLOAT, 3 * sizeof(float), 0);
-        QP_GL(gl, BindBuffer(GL_ELEMENT_ARRAY_BUFFER, d->indices));
-        QP_GL(gl, BufferData(GL_ELEMENT_ARRAY_BUFFER, (GLsizeiptr)(d->in->n_triangles * 3 * sizeof(uint32_t)),
-                             d->in->triangles, GL_STATIC_DRAW));
-    }
-    QP_GL(gl, BindVertexArray(d->corners_array));
-    QP_GL(gl, BindBuffer(GL_ARRAY_BUFFER, d->corners));
-    attribute(gl, 0, 3, GL_FLOAT, sizeof(qp_corner), offsetof(qp_corner, position));
-    attribute(gl, 1, 3, GL_FLOAT, sizeof(qp_corner), offsetof(qp_corner, normal));
-    attribute(gl, 2, 2, GL_FLOAT, sizeof(qp_corner), offsetof(qp_corner, uv));
-    attribute(gl, 3, 3, GL_UNSIGNED_BYTE, sizeof(qp_corner), offsetof(qp_corner, colour));
 }
 
 static qp_status check_target(qp_gl *gl, qp_error *err) {
@@ -120,6 +81,14 @@ static qp_status make_targets(drawing *d, qp_error *err) {
 
 /* ---- Passes ---- */
 
+/* What a drawer's programs are told in the pass at hand. */
+typedef struct pass_uniforms {
+    drawing *d;
+    const float *rows; /* of a shadow: affine map to [-1, 1]^3; NULL: the camera's pass */
+} pass_uniforms;
+
+static void set_pass(void *context, GLuint program);
+
 static qp_status draw_shadows(drawing *d, qp_error *err) {
     qp_gl *gl = d->gl;
     QP_GL(gl, GenTextures(1, &d->shadows));
@@ -144,21 +113,17 @@ static qp_status draw_shadows(drawing *d, qp_error *err) {
     QP_GL(gl, Enable(GL_DEPTH_TEST));
     QP_GL(gl, Enable(GL_POLYGON_OFFSET_FILL));
     QP_GL(gl, PolygonOffset(2.0f, 4.0f));
-    QP_GL(gl, UseProgram(d->shadow_program));
-    QP_GL(gl, BindVertexArray(d->points_array));
-    GLint rows = gl->GetUniformLocation(d->shadow_program, "rows");
-    for (uint32_t k = 0; k < d->lights; k++) {
+    qp_status status = QP_OK;
+    for (uint32_t k = 0; k < d->lights && status == QP_OK; k++) {
         QP_GL(gl, FramebufferTextureLayer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, d->shadows, 0, (GLint)k));
-        if (k == 0) {
-            qp_status status = check_target(gl, err);
-            if (status != QP_OK) return status;
-        }
+        if (k == 0) status = check_target(gl, err);
         QP_GL(gl, Clear(GL_DEPTH_BUFFER_BIT));
-        QP_GL(gl, Uniform4fv(rows, 3, d->lamps[k].rows));
-        QP_GL(gl, DrawElements(GL_TRIANGLES, (GLsizei)(3 * d->in->n_triangles), GL_UNSIGNED_INT, NULL));
+        pass_uniforms uniforms = {d, d->lamps[k].rows};
+        if (status == QP_OK)
+            status = d->in->drawer->draw(d->in->drawer, QP_GL_PASS_SHADOW, set_pass, &uniforms, err);
     }
     QP_GL(gl, Disable(GL_POLYGON_OFFSET_FILL));
-    return qp_gl_status(gl, err);
+    return status == QP_OK ? qp_gl_status(gl, err) : status;
 }
 
 /* Uniforms that the compiler left out have location -1, which GL ignores. */
@@ -208,31 +173,21 @@ static void draw_ground(drawing *d) {
     QP_GL(gl, DrawArrays(GL_TRIANGLE_STRIP, 0, 4));
 }
 
-static qp_status draw_surface(drawing *d, qp_error *err) {
-    qp_gl *gl = d->gl;
-    const qp_scene *s = d->in->scene;
-    GLuint program = d->surface_program;
+static void set_pass(void *context, GLuint program) {
+    const pass_uniforms *u = context;
+    qp_gl *gl = u->d->gl;
+    const qp_scene *s = u->d->in->scene;
+    float map[16] = {0};
+    for (int k = 0; u->rows != NULL && k < 12; k++) map[4 * (k % 4) + k / 4] = u->rows[k];
+    map[15] = 1;
+    QP_GL(gl, UniformMatrix4fv(gl->GetUniformLocation(program, "view_projection"), 1, GL_FALSE,
+                               u->rows != NULL ? map : u->d->in->view->view_projection));
+    if (u->rows != NULL) return;
     bool lines = s->colour_by == QP_COLOUR_KIND || s->colour_by == QP_COLOUR_LEVEL ||
                  s->colour_by == QP_COLOUR_PLAN || s->colour_by == QP_COLOUR_PATCH;
-    QP_GL(gl, UseProgram(program));
-    QP_GL(gl, UniformMatrix4fv(gl->GetUniformLocation(program, "view_projection"), 1, GL_FALSE,
-                               d->in->view->view_projection));
-    set_vector(gl, program, "eye", d->in->view->eye);
+    set_vector(gl, program, "eye", u->d->in->view->eye);
     set_float(gl, program, "wire_width", s->wire_width);
     set_float(gl, program, "border_width", lines ? 1.6 : 0);
-    QP_GL(gl, BindVertexArray(d->corners_array));
-    QP_GL(gl, BindBuffer(GL_ARRAY_BUFFER, d->corners));
-    qp_corner *corners = qp_alloc(3 * BATCH, sizeof *corners, false);
-    if (corners == NULL) return qp_fail_memory(err, 3 * BATCH * sizeof *corners, "triangles to draw");
-    for (uint64_t first = 0; first < d->in->n_triangles; first += BATCH) {
-        uint64_t left = d->in->n_triangles - first, count = left < BATCH ? left : BATCH;
-        d->in->fill(d->in->context, first, count, corners);
-        QP_GL(gl, BufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(3 * count * sizeof *corners), corners,
-                             GL_STREAM_DRAW));
-        QP_GL(gl, DrawArrays(GL_TRIANGLES, 0, (GLsizei)(3 * count)));
-    }
-    free(corners);
-    return qp_gl_status(gl, err);
 }
 
 static qp_status draw_geometry(drawing *d, qp_error *err) {
@@ -243,9 +198,10 @@ static qp_status draw_geometry(drawing *d, qp_error *err) {
     QP_GL(gl, ClearColor(0, 0, 0, 0));
     QP_GL(gl, Clear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT));
     if (d->in->scene->ground) draw_ground(d);
-    qp_status status = draw_surface(d, err);
+    pass_uniforms uniforms = {d, NULL};
+    qp_status status = d->in->drawer->draw(d->in->drawer, QP_GL_PASS_SHADE, set_pass, &uniforms, err);
     QP_GL(gl, Disable(GL_DEPTH_TEST));
-    return status;
+    return status == QP_OK ? qp_gl_status(gl, err) : status;
 }
 
 static void set_lights(drawing *d, GLuint program) {
@@ -315,15 +271,12 @@ static qp_status read_back(drawing *d, float *pixels, qp_error *err) {
 
 static void free_drawing(drawing *d) {
     qp_gl *gl = d->gl;
-    const GLuint programs[] = {d->shadow_program, d->surface_program, d->ground_program, d->shade_program};
+    const GLuint programs[] = {d->ground_program, d->shade_program};
     for (size_t k = 0; k < sizeof programs / sizeof programs[0]; k++)
         if (programs[k] != 0) QP_GL(gl, DeleteProgram(programs[k]));
-    const GLuint arrays[] = {d->points_array, d->corners_array, d->empty_array};
-    const GLuint buffers[] = {d->points, d->indices, d->corners};
     const GLuint targets[] = {d->shadow_target, d->geometry_target, d->target};
     const GLuint renderbuffers[] = {d->colour, d->depth};
-    QP_GL(gl, DeleteVertexArrays(3, arrays)); /* 0 is ignored in all of these */
-    QP_GL(gl, DeleteBuffers(3, buffers));
+    QP_GL(gl, DeleteVertexArrays(1, &d->empty_array)); /* 0 is ignored in all of these */
     QP_GL(gl, DeleteFramebuffers(3, targets));
     QP_GL(gl, DeleteRenderbuffers(2, renderbuffers));
     QP_GL(gl, DeleteTextures(1, &d->shadows));
@@ -344,9 +297,6 @@ static void choose_lights(drawing *d) {
 
 qp_status qp_gl_draw(qp_gl *gl, const qp_draw_input *input, float *pixels, qp_error *err) {
     drawing d = {.gl = gl, .in = input};
-    if (input->n_triangles > INT32_MAX / 3)
-        return qp_fail(err, QP_BAD_INPUT, "too many triangles to draw (%llu)",
-                       (unsigned long long)input->n_triangles);
     choose_lights(&d);
     d.lamps = qp_alloc(d.lights, sizeof *d.lamps, true);
     if (d.lamps == NULL) return qp_fail_memory(err, d.lights * sizeof *d.lamps, "lights");
@@ -354,7 +304,7 @@ qp_status qp_gl_draw(qp_gl *gl, const qp_draw_input *input, float *pixels, qp_er
     qp_view_lamps(input->scene, input->view, d.lights, d.lamps, &d.lamp_count);
     qp_status status = make_programs(&d, err);
     if (status == QP_OK) {
-        make_buffers(&d);
+        QP_GL(gl, GenVertexArrays(1, &d.empty_array));
         status = draw_shadows(&d, err);
     }
     if (status == QP_OK) status = make_targets(&d, err);

@@ -1,25 +1,31 @@
-/* Drawing of triangles into a picture of linear light. */
+/* Drawing of a surface into a picture of linear light. */
 #ifndef QP_GL_DRAW_H
 #define QP_GL_DRAW_H
 
 #include "gl/context.h"
 #include "gl/view.h"
 
-/* One corner of a triangle as the vertex shader reads it. */
-typedef struct qp_corner {
-    float position[3], normal[3], uv[2];
-    uint8_t colour[4]; /* the square root of linear light, for which 8 bits are enough */
-} qp_corner;
+typedef enum qp_gl_pass {
+    QP_GL_PASS_SHADE,  /* fragments of geometry.frag.glsl */
+    QP_GL_PASS_SHADOW, /* depth only */
+    QP_GL_PASS_CAPTURE /* no fragments */
+} qp_gl_pass;
+
+/* What draws the surface: the one thing in which the back ends differ. */
+typedef struct qp_drawer qp_drawer;
+struct qp_drawer {
+    /* Draws the surface in a pass, after calling set(context, program) for every program it uses, which is current then, to
+     * tell it its uniforms: mat4 view_projection, and, for geometry.frag.glsl, eye and the widths of lines. */
+    qp_status (*draw)(qp_drawer *drawer, qp_gl_pass pass, void (*set)(void *context, GLuint program),
+                      void *context, qp_error *err);
+    void (*close)(qp_drawer *drawer);
+};
 
 typedef struct qp_draw_input {
     const qp_scene *scene;
     const qp_view *view;
-    uint64_t n_points, n_triangles;
-    const float *positions;    /* 3 a point */
-    const uint32_t *triangles; /* 3 points a triangle */
-    /* Fills the corners of triangles [first, first + count). */
-    void (*fill)(const void *context, uint64_t first, uint64_t count, qp_corner *corners);
-    const void *context;
+    uint64_t n_triangles; /* about how many, which limits the shadows */
+    qp_drawer *drawer;
 } qp_draw_input;
 
 /* Draws with 4x multisampling into pixels, 4 floats a pixel (linear light, alpha premultiplied), rows from the

@@ -86,10 +86,10 @@ qp_status qp_patch_components(const qp_mesh *mesh, uint32_t **component, qp_erro
     return QP_OK;
 }
 
-void qp_triangle_colour(const qp_scene *scene, const qp_surface *surface, const uint32_t *component,
-                        const qp_stream *stream, const uint32_t triangle[3], float colour[3]) {
-    uint32_t patch = stream->sample_patch[triangle[0]];
-    bool planned = surface->patch_plan[patch] != QP_NONE;
+/* The colour of a whole patch, unless the scene asks for something that changes within it. */
+static void patch_colour(const qp_scene *scene, const qp_surface *surface, const uint32_t *component,
+                         uint32_t patch, float colour[3]) {
+    const bool planned = surface->patch_plan[patch] != QP_NONE;
     for (int k = 0; k < 3; k++) colour[k] = (float)scene->colour[k];
     if (scene->colour_by == QP_COLOUR_COMPONENT) {
         const double *own = scene->palette[component[patch] % scene->palette_count];
@@ -101,7 +101,15 @@ void qp_triangle_colour(const qp_scene *scene, const qp_surface *surface, const 
             memcpy(colour, (const float[3]){0.6f, 0.6f, 0.6f}, 3 * sizeof(float));
         else
             of_index(surface->patch_plan[patch], colour);
-    } else if (scene->colour_by == QP_COLOUR_KIND && planned) {
+    }
+}
+
+void qp_triangle_colour(const qp_scene *scene, const qp_surface *surface, const uint32_t *component,
+                        const qp_stream *stream, const uint32_t triangle[3], float colour[3]) {
+    uint32_t patch = stream->sample_patch[triangle[0]];
+    bool planned = surface->patch_plan[patch] != QP_NONE;
+    patch_colour(scene, surface, component, patch, colour);
+    if (scene->colour_by == QP_COLOUR_KIND && planned) {
         qp_leaf leaf = leaf_of(surface, stream, triangle, patch);
         /* Paler with depth, so that nested nodes of one kind tell apart. */
         float pale = 1 - powf(0.82f, (float)leaf.level);
@@ -110,4 +118,16 @@ void qp_triangle_colour(const qp_scene *scene, const qp_surface *surface, const 
     } else if (scene->colour_by == QP_COLOUR_LEVEL && planned) {
         of_level(leaf_of(surface, stream, triangle, patch).level, colour);
     }
+}
+
+qp_status qp_patch_colours(const qp_scene *scene, const qp_surface *surface, const uint32_t *component,
+                           float **colours, qp_error *err) {
+    const uint32_t n = surface->mesh->n_patches;
+    *colours = NULL;
+    if (scene->colour_by == QP_COLOUR_KIND || scene->colour_by == QP_COLOUR_LEVEL)
+        return qp_fail(err, QP_BAD_INPUT, "colours by the kind or level of nodes need the back end `stream`");
+    *colours = qp_alloc(n, 3 * sizeof(float), false);
+    if (*colours == NULL) return qp_fail_memory(err, n * 3 * sizeof(float), "colours");
+    for (uint32_t p = 0; p < n; p++) patch_colour(scene, surface, component, p, *colours + 3 * (size_t)p);
+    return QP_OK;
 }

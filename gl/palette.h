@@ -13,4 +13,9 @@ qp_status qp_patch_components(const qp_mesh *mesh, uint32_t **component, qp_erro
 void qp_triangle_colour(const qp_scene *scene, const qp_surface *surface, const uint32_t *component,
                         const qp_stream *stream, const uint32_t triangle[3], float colour[3]);
 
+/* The same where it is one a patch: 3 floats each, to be freed with free(). QP_BAD_INPUT for the kinds and levels of nodes, of
+ * which a patch has several. */
+qp_status qp_patch_colours(const qp_scene *scene, const qp_surface *surface, const uint32_t *component,
+                           float **colours, qp_error *err);
+
 #endif

@@ -73,9 +73,9 @@ qp_status qp_gl_make_program(qp_gl *gl, const qp_gl_program_desc *desc, GLuint *
         if (!good) {
             char log[300] = "";
             QP_GL(gl, GetProgramInfoLog(program, sizeof log, NULL, log));
-            status = qp_fail(err, QP_SYSTEM, "shader %s does not link: %.*s",
-                             desc->compute != NULL ? desc->compute : desc->vertex,
-                             (int)strcspn(log, "\n"), log);
+            status =
+                qp_fail(err, QP_SYSTEM, "shader %s does not link: %.*s",
+                        desc->compute != NULL ? desc->compute : desc->vertex, (int)strcspn(log, "\n"), log);
         }
     }
     if (status == QP_OK) status = qp_gl_status(gl, err);

@@ -278,6 +278,10 @@ void qp_gl_surface_close(qp_gl_surface *s) {
     free(s);
 }
 
+bool qp_gl_surface_is_empty(const qp_gl_surface *s, int kind) {
+    return s->n_runs[kind] == 0;
+}
+
 /* ---- Programs ---- */
 
 static qp_status make_program(qp_gl_surface *s, qp_gl_pass pass, int kind, qp_error *err) {

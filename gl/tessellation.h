@@ -4,7 +4,7 @@
 #ifndef QP_GL_TESSELLATION_H
 #define QP_GL_TESSELLATION_H
 
-#include "gl/context.h"
+#include "gl/draw.h"
 #include "host/frame/frame.h"
 
 typedef struct qp_gl_surface qp_gl_surface;
@@ -18,13 +18,10 @@ void qp_gl_surface_close(qp_gl_surface *surface);
 
 /* ---- Drawing ---- */
 
-typedef enum qp_gl_pass {
-    QP_GL_PASS_SHADE,  /* fragments of geometry.frag.glsl */
-    QP_GL_PASS_SHADOW, /* depth only */
-    QP_GL_PASS_CAPTURE /* no fragments */
-} qp_gl_pass;
 enum { QP_GL_GENERAL = 0, QP_GL_REGULAR = 1, QP_GL_KINDS = 2 };
 
+/* Has it no patches of a kind? */
+bool qp_gl_surface_is_empty(const qp_gl_surface *surface, int kind);
 /* The program of a pass for regular patches or all others, made when it is first asked for; the caller sets its uniforms but for those
  * that place the local frame. */
 qp_status qp_gl_surface_program(qp_gl_surface *surface, qp_gl_pass pass, int kind, GLuint *program,

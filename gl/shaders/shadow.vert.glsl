@@ -1,8 +1,7 @@
-// The surface as a light from one direction sees it: rows of an affine map to [-1, 1]^3.
+// The surface as a light from one direction sees it.
 layout(location = 0) in vec3 position;
-uniform vec4 rows[3];
+uniform mat4 view_projection;
 
 void main() {
-    vec4 p = vec4(position, 1.0);
-    gl_Position = vec4(dot(rows[0], p), dot(rows[1], p), dot(rows[2], p), 1.0);
+    gl_Position = view_projection * vec4(position, 1.0);
 }

@@ -1,5 +1,5 @@
 /* quadplan render: a scene to a picture. */
-#include "gl/render_stream.h"
+#include "gl/render.h"
 #include "host/cli/supports.h"
 
 #include <inttypes.h>
@@ -10,8 +10,8 @@
 /* What the command line asks for over what the scene says. */
 typedef struct overrides {
     bool colour_given, wireframe, tess_given, spacing_given, size_given;
-    int colour, spacing, precision;
-    double tess, tolerance; /* tolerance 0: the scene's */
+    int colour, spacing, precision, backend; /* backend: the API's values */
+    double tess, tolerance;                  /* tolerance 0: the scene's */
     uint64_t depth;
     cli_sizes size;
     const char *device;
@@ -78,7 +78,8 @@ static qp_status draw(const char *path, const overrides *o, work *w, qp_error *e
     if (status == QP_OK) status = qp_scene_tessellation(w->scene, w->mesh, &tessellation, &w->factors, err);
     if (status == QP_OK) status = qp_frame_eval(w->frame, &tessellation, &w->stream, err);
     if (status == QP_OK)
-        status = qp_render_stream(w->scene, w->surface, &w->stream, &w->image, w->backend, err);
+        status = qp_render(w->scene, w->frame, &tessellation, &w->stream, (qp_backend)o->backend, &w->image,
+                           w->backend, err);
     return status;
 }
 
@@ -110,6 +111,7 @@ static void print_result(bool as_json, const char *scene, const char *picture, c
     cli_supports_json(&json, &o->supports, &s->supports);
     qp_json_text(&json, "stream_hash", hash);
     qp_json_text(&json, "device", qp_device_name(w->device));
+    qp_json_text(&json, "backend", o->backend == QP_BACKEND_TESSELLATION ? "tessellation" : "stream");
     qp_json_text(&json, "gl", w->backend);
     qp_json_finish(&json);
 }
@@ -121,10 +123,14 @@ static qp_status run(int argc, char **argv, qp_error *err) {
     const cli_option options[] = {
         {"-o", "FILE", "where to write the picture: .png or .exr", CLI_TEXT, &picture, 0, 0, NULL},
         {"--color", COLOURS, "what to colour by", CLI_CHOICE, &o.colour, 0, 0, &o.colour_given},
+        {"--backend", "stream|tessellation",
+         "who draws: the triangles of the vertex stream (default), or GL's own tessellator from the plans",
+         CLI_CHOICE, &o.backend, 0, 0, NULL},
         {"--wireframe", NULL, "draw the tessellation's edges", CLI_FLAG, &o.wireframe, 0, 0, NULL},
         {"--tess", "F", "one tessellation factor for all, 1 to 64", CLI_REAL, &o.tess, 1, 64, &o.tess_given},
-        {"--tolerance", "T", "instead, the least factors that err by no more than T times the bounding box's diagonal",
-         CLI_REAL, &o.tolerance, 1e-300, 1e300, NULL},
+        {"--tolerance", "T",
+         "instead, the least factors that err by no more than T times the bounding box's diagonal", CLI_REAL,
+         &o.tolerance, 1e-300, 1e300, NULL},
         {"--spacing", CLI_SPACINGS, "of the tessellator", CLI_CHOICE, &o.spacing, 0, 0, &o.spacing_given},
         {"--size", "WxH", "of the picture, in pixels", CLI_SIZES, &o.size, 0, 0, &o.size_given},
         {"--precision", CLI_PRECISIONS, "of stencils and kernels (default float)", CLI_CHOICE, &o.precision,

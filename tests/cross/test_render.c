@@ -1,6 +1,6 @@
 /* A picture of a scene: what was drawn is there, in its colours, twice the same; EGL draws what OSMesa draws. */
 #define _GNU_SOURCE
-#include "gl/render_stream.h"
+#include "gl/render.h"
 #include "tests/check.h"
 
 #include <string.h>
@@ -13,19 +13,19 @@ typedef struct drawing {
     qp_frame *frame;
     qp_stream stream;
     float *factors;
+    qp_tessellation tessellation;
 } drawing;
 
 static bool open_drawing(const char *text, drawing *d) {
     qp_error err;
     qp_frame_options options = {.want_triangles = 1};
-    qp_tessellation t;
     return CHECK_OK(qp_scene_parse("s.json", text, strlen(text), &d->scene, &err), err) &&
            CHECK_OK(qp_scene_mesh(d->scene, NULL, NULL, &d->mesh, &err), err) &&
            CHECK_OK(qp_surface_create(d->mesh, &d->scene->surface_options, &d->surface, &err), err) &&
            CHECK_OK(qp_device_open("host", &d->device, &err), err) &&
            CHECK_OK(qp_frame_create(d->device, d->surface, &options, &d->frame, &err), err) &&
-           CHECK_OK(qp_scene_tessellation(d->scene, d->mesh, &t, &d->factors, &err), err) &&
-           CHECK_OK(qp_frame_eval(d->frame, &t, &d->stream, &err), err);
+           CHECK_OK(qp_scene_tessellation(d->scene, d->mesh, &d->tessellation, &d->factors, &err), err) &&
+           CHECK_OK(qp_frame_eval(d->frame, &d->tessellation, &d->stream, &err), err);
 }
 
 static void close_drawing(drawing *d) {
@@ -55,7 +55,10 @@ static void colours(drawing *d) {
         char backend[128];
         d->scene->colour_by = (qp_colour)mode;
         d->scene->wire_width = mode % 2;
-        if (!CHECK_OK(qp_render_stream(d->scene, d->surface, &d->stream, &image, backend, &err), err)) return;
+        if (!CHECK_OK(qp_render(d->scene, d->frame, &d->tessellation, &d->stream, QP_BACKEND_STREAM, &image,
+                                backend, &err),
+                      err))
+            return;
         size_t n = covered(&image), bright = 0, bad = 0;
         for (size_t k = 0; k < 4 * (size_t)image.width * image.height; k++) bad += !(image.rgba_f[k] >= 0);
         for (size_t k = 0; k < (size_t)image.width * image.height; k++)
@@ -77,7 +80,10 @@ static void normals(drawing *d) {
     qp_image image;
     char backend[128];
     d->scene->colour_by = QP_COLOUR_NORMAL;
-    if (!CHECK_OK(qp_render_stream(d->scene, d->surface, &d->stream, &image, backend, &err), err)) return;
+    if (!CHECK_OK(qp_render(d->scene, d->frame, &d->tessellation, &d->stream, QP_BACKEND_STREAM, &image,
+                            backend, &err),
+                  err))
+        return;
     const uint8_t *middle = image.rgba + 4 * (32 * 96 + 48);
     const double degree = 3.14159265358979 / 180;
     const double toward[3] = {cos(20 * degree) * sin(30 * degree), sin(20 * degree),
@@ -98,15 +104,21 @@ static void same_again(drawing *d) {
     char backend[128];
     double difference = -1;
     setenv("QUADPLAN_GL", "osmesa", 1);
-    if (!CHECK_OK(qp_render_stream(d->scene, d->surface, &d->stream, &first, backend, &err), err)) return;
+    if (!CHECK_OK(qp_render(d->scene, d->frame, &d->tessellation, &d->stream, QP_BACKEND_STREAM, &first,
+                            backend, &err),
+                  err))
+        return;
     CHECK(strncmp(backend, "OSMesa", 6) == 0);
-    if (CHECK_OK(qp_render_stream(d->scene, d->surface, &d->stream, &second, backend, &err), err)) {
+    if (CHECK_OK(qp_render(d->scene, d->frame, &d->tessellation, &d->stream, QP_BACKEND_STREAM, &second,
+                           backend, &err),
+                 err)) {
         CHECK_OK(qp_image_compare(&first, &second, &difference, &err), err);
         CHECK(difference == 0);
         qp_image_free(&second);
     }
     setenv("QUADPLAN_GL", "egl", 1);
-    if (qp_render_stream(d->scene, d->surface, &d->stream, &second, backend, &err) == QP_OK) {
+    if (qp_render(d->scene, d->frame, &d->tessellation, &d->stream, QP_BACKEND_STREAM, &second, backend,
+                  &err) == QP_OK) {
         CHECK(strncmp(backend, "EGL", 3) == 0);
         CHECK_OK(qp_image_compare(&first, &second, &difference, &err), err);
         printf("%s: differs by %g from OSMesa\n", backend, difference);
@@ -116,7 +128,8 @@ static void same_again(drawing *d) {
         printf("EGL left out: %s\n", err.message);
     }
     setenv("QUADPLAN_GL", "vulkan", 1);
-    CHECK(qp_render_stream(d->scene, d->surface, &d->stream, &second, backend, &err) == QP_BAD_INPUT);
+    CHECK(qp_render(d->scene, d->frame, &d->tessellation, &d->stream, QP_BACKEND_STREAM, &second, backend,
+                    &err) == QP_BAD_INPUT);
     unsetenv("QUADPLAN_GL");
     qp_image_free(&first);
 }
@@ -127,10 +140,12 @@ static void refuses(drawing *d) {
     char backend[128];
     qp_stream broken = d->stream;
     broken.triangles = NULL;
-    CHECK(qp_render_stream(d->scene, d->surface, &broken, &image, backend, &err) == QP_BAD_INPUT);
+    CHECK(qp_render(d->scene, d->frame, &d->tessellation, &broken, QP_BACKEND_STREAM, &image, backend,
+                    &err) == QP_BAD_INPUT);
     broken = d->stream;
     broken.n_samples = 3;
-    CHECK(qp_render_stream(d->scene, d->surface, &broken, &image, backend, &err) == QP_BAD_INPUT);
+    CHECK(qp_render(d->scene, d->frame, &d->tessellation, &broken, QP_BACKEND_STREAM, &image, backend,
+                    &err) == QP_BAD_INPUT);
     CHECK(image.rgba == NULL && image.rgba_f == NULL);
 }
 

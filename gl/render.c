@@ -1,5 +1,5 @@
-#include "gl/render_stream.h"
-#include "gl/draw.h"
+#include "gl/render.h"
+#include "gl/drawers.h"
 #include "gl/palette.h"
 
 #include <math.h>
@@ -7,35 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-typedef struct job {
-    const qp_scene *scene;
-    const qp_surface *surface;
-    const qp_stream *stream;
-    float *positions;    /* 3 a sample */
-    uint32_t *component; /* of a patch, or NULL */
-} job;
-
 static float component(const qp_stream *stream, size_t sample, size_t k) {
     return stream->precision == QP_DOUBLE ? (float)((const double *)stream->vertices)[6 * sample + k]
                                           : ((const float *)stream->vertices)[6 * sample + k];
-}
-
-static void fill_corners(const void *context, uint64_t first, uint64_t count, qp_corner *corners) {
-    const job *j = context;
-    for (uint64_t t = first; t < first + count; t++) {
-        const uint32_t *triangle = j->stream->triangles + 3 * t;
-        float colour[3];
-        uint8_t bytes[4] = {0, 0, 0, 255};
-        qp_triangle_colour(j->scene, j->surface, j->component, j->stream, triangle, colour);
-        for (int k = 0; k < 3; k++) bytes[k] = (uint8_t)(sqrtf(fminf(fmaxf(colour[k], 0), 1)) * 255 + 0.5f);
-        for (int c = 0; c < 3; c++, corners++) {
-            size_t sample = triangle[c];
-            memcpy(corners->position, j->positions + 3 * sample, sizeof corners->position);
-            for (size_t k = 0; k < 3; k++) corners->normal[k] = component(j->stream, sample, 3 + k);
-            memcpy(corners->uv, j->stream->uv + 2 * sample, sizeof corners->uv);
-            memcpy(corners->colour, bytes, sizeof bytes);
-        }
-    }
 }
 
 /* What the shaders and the palette index must be there. */
@@ -55,17 +29,18 @@ static qp_status check_stream(const qp_surface *surface, const qp_stream *stream
     return QP_OK;
 }
 
-static qp_status take_positions(job *j, qp_error *err) {
-    uint64_t n = j->stream->n_samples;
-    j->positions = qp_alloc(n, 3 * sizeof(float), false);
-    if (j->positions == NULL) return qp_fail_memory(err, n * 3 * sizeof(float), "positions");
+/* The stream's positions as floats in *positions, malloced. */
+static qp_status take_positions(const qp_stream *stream, float **positions, qp_error *err) {
+    uint64_t n = stream->n_samples;
+    *positions = qp_alloc(n, 3 * sizeof(float), false);
+    if (*positions == NULL) return qp_fail_memory(err, n * 3 * sizeof(float), "positions");
     for (uint64_t i = 0; i < n; i++)
         for (size_t k = 0; k < 3; k++) {
-            float x = component(j->stream, i, k);
+            float x = component(stream, i, k);
             if (!isfinite(x))
                 return qp_fail(err, QP_CHECK_FAILED, "sample %llu on patch %u is not finite",
-                               (unsigned long long)i, j->stream->sample_patch[i]);
-            j->positions[3 * i + k] = x;
+                               (unsigned long long)i, stream->sample_patch[i]);
+            (*positions)[3 * i + k] = x;
         }
     return QP_OK;
 }
@@ -88,31 +63,41 @@ static void to_bytes(qp_image *image) {
     }
 }
 
-qp_status qp_render_stream(const qp_scene *scene, const qp_surface *surface, const qp_stream *stream,
-                           qp_image *out, char backend_used[128], qp_error *err) {
+static qp_status open_drawer(qp_gl *gl, qp_backend backend, const qp_drawn *drawn, qp_drawer **drawer,
+                             qp_error *err) {
+    return backend == QP_BACKEND_TESSELLATION ? qp_drawer_tessellation(gl, drawn, drawer, err)
+                                              : qp_drawer_stream(gl, drawn, drawer, err);
+}
+
+qp_status qp_render(const qp_scene *scene, const qp_frame *frame, const qp_tessellation *tessellation,
+                    const qp_stream *stream, qp_backend backend, qp_image *out, char backend_used[128],
+                    qp_error *err) {
     memset(out, 0, sizeof *out);
     backend_used[0] = '\0';
-    job j = {scene, surface, stream, NULL, NULL};
+    float *positions = NULL;
+    uint32_t *components = NULL;
     qp_gl *gl = NULL;
+    qp_drawer *drawer = NULL;
     qp_view view;
-    qp_status status = check_stream(surface, stream, err);
-    if (status == QP_OK) status = take_positions(&j, err);
+    qp_status status = check_stream(frame->surface, stream, err);
+    if (status == QP_OK) status = take_positions(stream, &positions, err);
     if (status == QP_OK && scene->colour_by == QP_COLOUR_COMPONENT)
-        status = qp_patch_components(surface->mesh, &j.component, err);
+        status = qp_patch_components(frame->surface->mesh, &components, err);
     if (status == QP_OK) status = qp_image_create(scene->width, scene->height, out, err);
     if (status == QP_OK) status = qp_gl_open(&gl, err);
+    const qp_drawn drawn = {scene, frame, frame->surface, tessellation, stream, positions, components};
+    if (status == QP_OK) status = open_drawer(gl, backend, &drawn, &drawer, err);
     if (status == QP_OK) {
         snprintf(backend_used, 128, "%s", gl->backend);
-        qp_view_make(scene, j.positions, stream->n_samples, &view);
-        qp_draw_input input = {
-            scene,        &view, stream->n_samples, stream->n_triangles, j.positions, stream->triangles,
-            fill_corners, &j};
+        qp_view_make(scene, positions, stream->n_samples, &view);
+        const qp_draw_input input = {scene, &view, stream->n_triangles, drawer};
         status = qp_gl_draw(gl, &input, out->rgba_f, err);
     }
     if (status == QP_OK) to_bytes(out);
     if (status != QP_OK) qp_image_free(out);
+    if (drawer != NULL) drawer->close(drawer);
     qp_gl_close(gl);
-    free(j.positions);
-    free(j.component);
+    free(positions);
+    free(components);
     return status;
 }
