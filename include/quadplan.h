@@ -238,7 +238,7 @@ typedef struct qp_supports_report {
         peak_bytes; /* most that were allocated and not yet released at one time; of a cache, that were valid */
     uint64_t allocations, allocated_bytes;
     /* Ring. */
-    uint64_t stalls; /* allocations that had to wait for room */
+    uint64_t stalls; /* allocations that had to wait for room; in the streamed schedule launches of the hull stage that had to */
     double
         stall_ms; /* how long they waited, all together; 0 where the device has no clock that kernels can read */
     uint64_t wraps;        /* times the ring began anew at its start */

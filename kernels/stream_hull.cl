@@ -24,6 +24,7 @@ __kernel void QP_NAME(stream_hull)(__global const uint *heads, __global const ui
         patch.ticket = first_ticket + (uint)get_group_id(0);
         patch.points = entry[QP_ENTRY_ROWS];
         patch.slot = QP_RB_NO_SLOT;
+        patch.span = 0; /* launches have one */
         if ((ring[QP_RB_OPTIONS] & QP_RB_TRACE) != 0) {
             patch.slot = ring_take_slot(ring);
             qp_atomic_store(ring_record(ring, patch.ticket) + QP_RECORD_SLOT, patch.slot);

@@ -176,7 +176,7 @@ static qp_status write_events(writer *w, qp_error *err) {
     qp_json_close(&w->json);
     qp_json_open_array(&w->json, "traceEvents");
     name_lanes(w, SLOTS, w->streamed ? "slots of the hull stage" : "warp slots");
-    if (w->streamed) name_lanes(w, DOMAIN, "domain stage");
+    if (w->streamed) name_lanes(w, DOMAIN, "domain stage, from the hull's end on");
     name_lanes(w, RING, "ring");
     for (uint64_t i = 0; i < trace->n_patches; ++i) slot_slices(w, &trace->patches[i]);
     qp_status status = w->streamed ? domain_slices(w, err) : QP_OK;

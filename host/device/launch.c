@@ -125,6 +125,8 @@ qp_status qp_device_finish(qp_device *device, qp_error *err) {
         cl_event event = device->pending[i].event;
         cl_int run = CL_COMPLETE;
         cl_ulong start = 0, end = 0;
+        /* In Mesa 22.3 clFinish does not wait for what clFlush has sent on its way. Failures are found below. */
+        clWaitForEvents(1, &event);
         if (status == QP_OK)
             status =
                 qp_cl_check(clGetEventInfo(event, CL_EVENT_COMMAND_EXECUTION_STATUS, sizeof run, &run, NULL),

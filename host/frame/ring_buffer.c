@@ -240,7 +240,7 @@ qp_status qp_ring_report(qp_frame *frame, qp_stream *stream, qp_error *err) {
     qp_supports_report *report = &stream->supports;
     report->capacity_bytes = supports->ring_bytes / bytes * bytes;
     report->peak_bytes = words[QP_RB_PEAK] * bytes;
-    report->allocations = words[QP_RB_TURN];
+    report->allocations = words[qp_frame_is_streamed(frame) ? QP_RB_ALLOCATIONS : QP_RB_TURN];
     report->allocated_bytes = wide(words + QP_RB_ALLOCATED) * bytes;
     report->stalls = words[QP_RB_STALLS];
     report->stall_ms = ticks_per_ms > 0 ? (double)wide(words + QP_RB_STALL_TICKS) / ticks_per_ms : 0;
