@@ -20,13 +20,13 @@ shift
 [ $# -gt 0 ] || set -- ring validate cache
 mkdir -p "$out"
 
-# smallest MODEL FACTOR MACHINE RETIREMENT: a line of rings.txt
+# smallest MODEL FACTOR MACHINE RETIREMENT ISSUE: a line of rings.txt
 smallest() {
-    "$program" ring "$QUADPLAN_MODELS/$1.obj" --tess "$2" --machine "$3" --retire "$4" --sizes 1M --json | python3 -c '
+    "$program" ring "$QUADPLAN_MODELS/$1.obj" --tess "$2" --machine "$3" --retire "$4" --issue "$5" --sizes 1M --json | python3 -c '
 import json, sys
 o = json.load(sys.stdin)
 row = o["rows"][0]
-print("%-12s %6s %-11s %-13s %11d %11d %11d %11d %11d %9.4f" % (*sys.argv[1:], o["smallest_ring_bytes_at_99_percent"],
+print("%-12s %6s %-11s %-13s %-6s %11d %11d %11d %11d %11d %9.4f" % (*sys.argv[1:], o["smallest_ring_bytes_at_99_percent"],
       o["estimate_bytes"], o["worst_case_bytes"], o["scratch"]["peak_bytes"], o["largest_bytes"], row["relative_throughput"]))' "$@"
 }
 
@@ -42,15 +42,18 @@ rings() {
         done
     done
     {
-        printf '%-12s %6s %-11s %-13s %11s %11s %11s %11s %11s %9s\n' model factor machine retirement '99 percent' estimate \
+        printf '%-12s %6s %-11s %-13s %-6s %11s %11s %11s %11s %11s %9s\n' model factor machine retirement issue '99 percent' estimate \
             'worst case' 'scratch peak' 'a patch' 'at 1 MB'
         for factor in 8 16 32 64; do
             for retirement in in-order out-of-order; do
-                for machine in paper mobile large hull-bound; do smallest armorguy $factor $machine $retirement; done
+                for machine in paper mobile large hull-bound; do smallest armorguy $factor $machine $retirement patch; done
             done
         done
+        for machine in paper mobile large hull-bound; do
+            for retirement in in-order out-of-order; do smallest armorguy 64 $machine $retirement plan; done
+        done
         for model in bigguy monsterfrog; do
-            for machine in paper mobile large hull-bound; do smallest $model 64 $machine in-order; done
+            for machine in paper mobile large hull-bound; do smallest $model 64 $machine in-order patch; done
         done
     } >"$out/rings.txt"
 }
