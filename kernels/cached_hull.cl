@@ -30,19 +30,16 @@ typedef struct QP_NAME(cache) {
     uint policy, places, sets, ways;
 } QP_NAME(cache);
 
-QP_FUNCTION QP_NAME(cache)
-    QP_NAME(cache_of)(volatile __global uint *control, volatile __global uint *tags, volatile __global uint *points,
-                      volatile __global uint *seen) {
-    QP_NAME(cache) c;
-    c.control = control;
-    c.tags = tags;
-    c.points = points;
-    c.seen = seen;
-    c.policy = control[QP_CACHE_POLICY];
-    c.places = control[QP_CACHE_PLACES];
-    c.sets = control[QP_CACHE_SETS];
-    c.ways = control[QP_CACHE_WAYS];
-    return c;
+QP_FUNCTION void QP_NAME(cache_of)(volatile __global uint *control, volatile __global uint *tags,
+                                   volatile __global uint *points, volatile __global uint *seen, QP_NAME(cache) * c) {
+    c->control = control;
+    c->tags = tags;
+    c->points = points;
+    c->seen = seen;
+    c->policy = control[QP_CACHE_POLICY];
+    c->places = control[QP_CACHE_PLACES];
+    c->sets = control[QP_CACHE_SETS];
+    c->ways = control[QP_CACHE_WAYS];
 }
 
 QP_FUNCTION void QP_NAME(cache_read)(const QP_NAME(cache) * c, ulong place, QP_NAME(cache_value) * value) {
@@ -182,20 +179,19 @@ QP_FUNCTION void QP_NAME(cache_count)(const QP_NAME(cache) * c, uint counter, ui
 }
 
 /* Looks up `count` points from number i of the patch on. */
-QP_FUNCTION QP_NAME(cache_fate)
-    QP_NAME(cache_look_up)(const QP_NAME(cache) * c, const QP_NAME(hull_job) * job, __global const uint *numbers, uint i,
-                           uint count, __global real *out) {
-    QP_NAME(cache_fate) fate = {0u, 0u, 0u, 0u, 0u};
+QP_FUNCTION void QP_NAME(cache_look_up)(const QP_NAME(cache) * c, const QP_NAME(hull_job) * job,
+                                        __global const uint *numbers, uint i, uint count,
+                                        QP_NAME(cache_fate) * fate, __global real *out) {
+    fate->missed = fate->cold = fate->conflict = fate->duplicate = fate->filled = 0u;
     for (uint l = 0; l < count; ++l) {
         QP_NAME(cache_value) value;
         const int hit = QP_NAME(cache_find)(c, numbers[i + l], &value);
-        QP_NAME(cache_shadow)(c, numbers[i + l], hit, 1u << l, &fate);
+        QP_NAME(cache_shadow)(c, numbers[i + l], hit, 1u << l, fate);
         if (hit)
             QP_NAME(hull_write)(job, i + l, value.r[0], value.r[1], value.r[2], value.r[3], out);
         else
-            fate.missed |= 1u << l;
+            fate->missed |= 1u << l;
     }
-    return fate;
 }
 
 /* Writes the points of a block that were missing, and puts them into the cache. */
@@ -262,8 +258,10 @@ __kernel void QP_NAME(cached_hull)(__global const uint *heads, __global const ui
     __local uint any;
     __global const uint *entry = entries + ((ulong)first_entry + get_group_id(0)) * QP_ENTRY_WORDS;
     __global real *out = support + 4u * QP_ENTRY_WIDE(entry, QP_ENTRY_SUPPORT);
-    const QP_NAME(hull_job) job = QP_NAME(hull_job_of)(heads, trees, reals, rings, positions, entry);
-    const QP_NAME(cache) c = QP_NAME(cache_of)(control, tags, points, seen);
+    QP_NAME(hull_job) job;
+    QP_NAME(hull_job_of)(heads, trees, reals, rings, positions, entry, &job);
+    QP_NAME(cache) c;
+    QP_NAME(cache_of)(control, tags, points, seen, &c);
     const uint rows = entry[QP_ENTRY_ROWS], item = (uint)get_local_id(0), items = (uint)get_local_size(0);
     const ulong first_number = QP_ENTRY_WIDE(entry, QP_ENTRY_NUMBERS);
     uint hits = 0u, cold = 0u, over = 0u, conflict = 0u, duplicates = 0u, filled = 0u;
@@ -280,9 +278,10 @@ __kernel void QP_NAME(cached_hull)(__global const uint *heads, __global const ui
         barrier(CLK_LOCAL_MEM_FENCE);
         for (uint b = item; b < blocks; b += items) {
             const uint i = b * QP_LANES;
-            fates[b] =
-                QP_NAME(cache_look_up)(&c, &job, numbers, first + i, count - i < QP_LANES ? count - i : QP_LANES, out);
-            if (fates[b].missed != 0u) (void)qp_local_add(&any, 1u);
+            QP_NAME(cache_fate) fate;
+            QP_NAME(cache_look_up)(&c, &job, numbers, first + i, count - i < QP_LANES ? count - i : QP_LANES, &fate, out);
+            fates[b] = fate;
+            if (fate.missed != 0u) (void)qp_local_add(&any, 1u);
         }
         barrier(CLK_LOCAL_MEM_FENCE);
         if (any != 0u) {
@@ -316,7 +315,8 @@ __kernel void QP_NAME(cached_hull)(__global const uint *heads, __global const ui
 /* Forgets `count` points, whose numbers are in `list`, QP_CACHE_FORGET a work-group. Not to run beside cached_hull. */
 __kernel void QP_NAME(cache_forget)(__global const uint *list, uint count, volatile __global uint *control,
                                     volatile __global uint *tags, volatile __global uint *seen QP_GROUP) {
-    const QP_NAME(cache) c = QP_NAME(cache_of)(control, tags, tags, seen);
+    QP_NAME(cache) c;
+    QP_NAME(cache_of)(control, tags, tags, seen, &c);
     const uint first = (uint)get_group_id(0) * QP_CACHE_FORGET;
     const uint end = count - first < QP_CACHE_FORGET ? count : first + QP_CACHE_FORGET;
     uint dropped = 0u;

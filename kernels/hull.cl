@@ -24,23 +24,23 @@ typedef struct QP_NAME(hull_block) {
     lanes from[3], sum[3], part[3];
 } QP_NAME(hull_block);
 
-QP_FUNCTION QP_NAME(hull_job)
-    QP_NAME(hull_job_of)(__global const uint *heads, __global const uint *trees, __global const real *reals,
-                         __global const uint *rings, __global const real *positions, __global const uint *entry) {
+/* Fills *job. (Functions here return no structs: LLVM marks what they are returned in, and Oclgrind stops at the marks.) */
+QP_FUNCTION void QP_NAME(hull_job_of)(__global const uint *heads, __global const uint *trees,
+                                      __global const real *reals, __global const uint *rings,
+                                      __global const real *positions, __global const uint *entry,
+                                      QP_NAME(hull_job) * job) {
     __global const uint *head = heads + entry[QP_ENTRY_HEAD];
-    QP_NAME(hull_job) job;
-    job.ring_size = head[QP_HEAD_RING];
-    job.points = head[QP_HEAD_POINTS];
-    job.shares = (head[QP_HEAD_FLAGS] & QP_PLAN_MODES) != 0;
-    job.weights = reals + head[QP_HEAD_REALS];
-    job.vertices = positions + QP_POSITION_FIRST;
-    job.ring = rings + QP_ENTRY_WIDE(entry, QP_ENTRY_RING);
-    job.order = job.ring + job.ring_size;
-    job.anchors = job.order + job.ring_size;
-    job.anchored =
+    job->ring_size = head[QP_HEAD_RING];
+    job->points = head[QP_HEAD_POINTS];
+    job->shares = (head[QP_HEAD_FLAGS] & QP_PLAN_MODES) != 0;
+    job->weights = reals + head[QP_HEAD_REALS];
+    job->vertices = positions + QP_POSITION_FIRST;
+    job->ring = rings + QP_ENTRY_WIDE(entry, QP_ENTRY_RING);
+    job->order = job->ring + job->ring_size;
+    job->anchors = job->order + job->ring_size;
+    job->anchored =
         (head[QP_HEAD_FLAGS] & QP_PLAN_ANCHORS) != 0 ? trees + head[QP_HEAD_TREE] + head[QP_HEAD_ANCHORS] : 0;
-    job.origin = entry[QP_ENTRY_ORIGIN];
-    return job;
+    job->origin = entry[QP_ENTRY_ORIGIN];
 }
 
 /* Corner that point i is anchored to, and whether it moves (plan_layout.h). */
@@ -147,7 +147,8 @@ QP_FUNCTION void QP_NAME(hull_patch)(__global const uint *heads, __global const 
                                      __global const real *positions, __global const uint *entry, uint rows,
                                      __global real *out, __local real *ring_x, __local real *ring_y,
                                      __local real *ring_z) {
-    const QP_NAME(hull_job) job = QP_NAME(hull_job_of)(heads, trees, reals, rings, positions, entry);
+    QP_NAME(hull_job) job;
+    QP_NAME(hull_job_of)(heads, trees, reals, rings, positions, entry, &job);
     const uint item = (uint)get_local_id(0) * QP_LANES, step = (uint)get_local_size(0) * QP_LANES;
     QP_NAME(hull_block) b;
     barrier(CLK_LOCAL_MEM_FENCE); /* nobody still reads a patch before */
