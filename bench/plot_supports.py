@@ -171,7 +171,8 @@ def draw_cache(result):
                      "time, scratch = 1")
     panels[2].axhline(1, color=GREY, linewidth=1)
     panels[0].legend(fontsize=8.5, loc="lower right")
-    figure.suptitle("%s: cache of control points" % os.path.splitext(result["mesh"])[0], y=0.985, fontsize=12)
+    figure.suptitle("%s: cache of control points, patches issued by %s" % (
+        os.path.splitext(result["mesh"])[0], result["issue"]), y=0.985, fontsize=12)
     figure.subplots_adjust(left=0.05, right=0.99, top=0.86, bottom=0.125, wspace=0.2)
     return figure
 

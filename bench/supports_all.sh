@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The numbers and charts of docs/ring-buffer.md and docs/subdivision-cache.md:
 #     QUADPLAN_MODELS=FOLDER bench/supports_all.sh OUT_FOLDER [ring|validate|cache]...
-# OUT_FOLDER gets ring-MODEL[-MACHINE].csv and .png, rings.txt (the smallest rings), validate-MODEL.txt, and cache-MODEL.csv, .png and
+# OUT_FOLDER gets ring-MODEL[-MACHINE].csv and .png, rings.txt (the smallest rings), validate-MODEL.txt, and MODEL.csv, .png and
 # .txt. The program is build-release/quadplan, or QUADPLAN_PROGRAM. The models of rings take seconds and need no idle machine; validations
 # and the times of caches mean something only where the processors are the program's alone.
 set -eu
@@ -69,10 +69,10 @@ validate() {
 
 caches() {
     for model in bigguy monsterfrog armorguy; do
-        sizes=32K..4M
-        [ $model = armorguy ] && sizes=256K..32M
-        "$program" cache "$QUADPLAN_MODELS/$model.obj" --tess 64 --sizes $sizes --repeat 3 --csv "$out/cache-$model.csv" \
-            --chart "$out/cache-$model.png" | sed '1s|.*/||' >"$out/cache-$model.txt"
+        factor=64 sizes=32K..2M
+        [ $model = armorguy ] && factor=16 sizes=256K..16M
+        "$program" cache "$QUADPLAN_MODELS/$model.obj" --tess $factor --issue patch --sizes $sizes --repeat 3 --csv "$out/$model.csv" \
+            --chart "$out/$model.png" | sed '1s|.*/||' >"$out/$model.txt"
     done
 }
 

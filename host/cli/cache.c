@@ -14,7 +14,7 @@ typedef struct cache_options {
     const char *sizes, *device;
     uint64_t passes, repeats;
     bool passes_given, json;
-    int policy, precision; /* 0: every policy */
+    int policy, precision, issue; /* 0: every policy */
     cli_report report;
 } cache_options;
 
@@ -121,7 +121,9 @@ static qp_status measure_all(bench *b, const uint64_t *sizes, size_t n_sizes, ca
     qp_status status = QP_OK;
     for (int policy = 0; policy < POLICIES && status == QP_OK; ++policy) {
         if (only != 0 && policy + 1 != only) continue;
-        qp_supports_options supports = {.kind = QP_SUPPORTS_CACHE, .cache_policy = (qp_cache_policy)policy};
+        qp_supports_options supports = {.kind = QP_SUPPORTS_CACHE,
+                                        .issue_order = (qp_issue_order)b->options->issue,
+                                        .cache_policy = (qp_cache_policy)policy};
         const size_t n = policy == QP_CACHE_ALL ? 1 : n_sizes;
         for (size_t i = 0; i < n && status == QP_OK; ++i) {
             supports.cache_bytes = sizes[i];
@@ -160,7 +162,7 @@ static void close_bench(bench *b) {
 
 static qp_status measure(const char *argument, const cache_options *o, const uint64_t *sizes, size_t n_sizes,
                          qp_error *err) {
-    cache_run run = {.name = argument, .precision = o->precision, .repeats = o->repeats};
+    cache_run run = {.name = argument, .precision = o->precision, .issue = o->issue, .repeats = o->repeats};
     bench *b = qp_alloc(1, sizeof *b, true);
     if (b == NULL) return qp_fail_memory(err, sizeof *b, "timings");
     b->options = o;
@@ -189,6 +191,8 @@ static qp_status run_cache(int argc, char **argv, qp_error *err) {
          CACHE_MOST_PASSES, &o.passes_given},
         {"--policy", EVERY_POLICY, "a place for every point, or which one goes (default every)", CLI_CHOICE,
          &o.policy, 0, 0, NULL},
+        {"--issue", CLI_ISSUE_ORDERS, "patches by their plans, or in the mesh's order (default plan)",
+         CLI_CHOICE, &o.issue, 0, 0, NULL},
         {"--repeat", "N", "from an empty cache; times are medians (default 5)", CLI_COUNT, &o.repeats, 1,
          CACHE_MOST_REPEATS, NULL},
         {"--precision", CLI_PRECISIONS, "of stencils and kernels (default float)", CLI_CHOICE, &o.precision,

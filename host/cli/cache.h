@@ -22,7 +22,7 @@ typedef struct cache_row {
 typedef struct cache_run {
     const char *name; /* of the mesh or scene */
     const char *device;
-    int precision;
+    int precision, issue; /* index into CLI_ISSUE_ORDERS */
     uint64_t repeats, n_passes;
     float factors[CACHE_MOST_PASSES];     /* of each pass, 0: chosen within a tolerance, or at random */
     const char *names[CACHE_MOST_PASSES]; /* of a scene's passes, or NULL */

@@ -6,6 +6,7 @@
 #include <string.h>
 
 static const char *const policies[] = {"all", "direct", "clock", "levels"};
+static const char *const orders[] = {"plan", "patch"};
 
 static double hit_rate(const cache_row *row) {
     return row->needed == 0 ? 0 : (double)row->hits / (double)row->needed;
@@ -17,7 +18,7 @@ static double relative(double ms, double scratch_ms) {
 
 void cache_write_table(const void *result, FILE *file) {
     const cache_run *run = result;
-    fprintf(file, "%s on %s; passes at", run->name, run->device);
+    fprintf(file, "%s on %s, issued by %s; passes at", run->name, run->device, orders[run->issue]);
     for (uint64_t p = 0; p < run->n_passes; ++p) {
         const char *comma = p == 0 ? "" : ",";
         if (run->factors[p] != 0)
@@ -82,6 +83,7 @@ void cache_write_json(const void *result, FILE *file) {
     qp_json_text(&json, "mesh", base_name(run->name));
     qp_json_text(&json, "device", run->device);
     qp_json_text(&json, "precision", run->precision == QP_DOUBLE ? "double" : "float");
+    qp_json_text(&json, "issue", orders[run->issue]);
     qp_json_integer(&json, "repeat", run->repeats);
     qp_json_open_array(&json, "passes");
     for (uint64_t p = 0; p < run->n_passes; ++p) {

@@ -3,7 +3,7 @@ source "$(dirname "$0")/common.sh"
 
 run cache --help
 check "cache --help" [ "$code" -eq 0 ]
-for option in sizes passes policy repeat precision device json csv chart tess; do
+for option in sizes passes policy issue repeat precision device json csv chart tess; do
     check "cache --help names --$option" grep -q -e "--$option" "$work/stdout"
 done
 
@@ -42,6 +42,8 @@ value 'o["rows"][0]["points_computed"] == o["rows"][2]["points_computed"]'
 run cache "$QUADPLAN_SOURCE_DIR/scenes/passes.json" "${host[@]}" --policy all --json --passes 5
 value '[p["tess"] for p in o["passes"]] == [32, 8, 16, 32, 8]'
 value 'o["rows"][4]["points_computed"] == o["rows"][0]["points_computed"]'
+run cache gen:cube "${host[@]}" --policy clock --sizes 4K --passes 1 --issue patch --json
+value 'o["issue"] == "patch" and o["rows"][0]["points_needed"] == 6 * 237'
 run cache gen:cube "${host[@]}" --policy direct --sizes 64K --passes 1 --tess 4 --precision double
 check "the table" grep -q "hit rate" "$work/stdout"
 run cache gen:torus "${host[@]}" --policy all --passes 1 --tess 4 --json
