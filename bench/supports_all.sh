@@ -1,8 +1,7 @@
 #!/usr/bin/env bash
 # The numbers and charts of docs/ring-buffer.md and docs/subdivision-cache.md:
 #     QUADPLAN_MODELS=FOLDER bench/supports_all.sh OUT_FOLDER [ring|validate|cache]...
-# OUT_FOLDER gets ring-MODEL[-MACHINE].csv and .png, rings.txt (the smallest rings), validate-MODEL.txt, and MODEL.csv, .png and
-# .txt. The program is build-release/quadplan, or QUADPLAN_PROGRAM. The models of rings take seconds and need no idle machine; validations
+# OUT_FOLDER gets ring/MODEL[-MACHINE].csv and .png, ring/smallest.txt, ring/validate.txt, and cache/MODEL.csv and .png. The program is build-release/quadplan, or QUADPLAN_PROGRAM. The models of rings take seconds and need no idle machine; validations
 # and the times of caches mean something only where the processors are the program's alone.
 set -eu
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -18,9 +17,9 @@ fi
 out=$1
 shift
 [ $# -gt 0 ] || set -- ring validate cache
-mkdir -p "$out"
+mkdir -p "$out/ring" "$out/cache"
 
-# smallest MODEL FACTOR MACHINE RETIREMENT ISSUE: a line of rings.txt
+# smallest MODEL FACTOR MACHINE RETIREMENT ISSUE: a line of smallest.txt
 smallest() {
     "$program" ring "$QUADPLAN_MODELS/$1.obj" --tess "$2" --machine "$3" --retire "$4" --issue "$5" --sizes 1M --json | python3 -c '
 import json, sys
@@ -35,10 +34,10 @@ rings() {
         machines=paper
         [ $model = armorguy ] && machines="paper mobile large hull-bound"
         for machine in $machines; do
-            name=ring-$model
+            name=$model
             [ "$machine" = paper ] || name=$name-$machine
             "$program" ring "$QUADPLAN_MODELS/$model.obj" --tess 64 --machine "$machine" \
-                --sizes 8K..32M,96K,192K,384K,768K,1536K,3M,6M --csv "$out/$name.csv" --chart "$out/$name.png" >/dev/null
+                --sizes 8K..32M,96K,192K,384K,768K,1536K,3M,6M --csv "$out/ring/$name.csv" --chart "$out/ring/$name.png" >/dev/null
         done
     done
     {
@@ -55,7 +54,7 @@ rings() {
         for model in bigguy monsterfrog; do
             for machine in paper mobile large hull-bound; do smallest $model 64 $machine in-order patch; done
         done
-    } >"$out/rings.txt"
+    } >"$out/ring/smallest.txt"
 }
 
 validate() {
@@ -64,15 +63,15 @@ validate() {
             "$program" ring "$QUADPLAN_MODELS/$model.obj" --tess 16 --retire $retirement --issue plan --validate --sizes 1M |
                 sed -n '/^the fused/,$p' | sed "s/^the fused/$model, factor 16, $retirement: the fused/"
         done
-    done >"$out/validate.txt"
+    done >"$out/ring/validate.txt"
 }
 
 caches() {
     for model in bigguy monsterfrog armorguy; do
         factor=64 sizes=32K..2M
         [ $model = armorguy ] && factor=16 sizes=256K..16M
-        "$program" cache "$QUADPLAN_MODELS/$model.obj" --tess $factor --issue patch --sizes $sizes --repeat 3 --csv "$out/$model.csv" \
-            --chart "$out/$model.png" | sed '1s|.*/||' >"$out/$model.txt"
+        "$program" cache "$QUADPLAN_MODELS/$model.obj" --tess $factor --issue patch --sizes $sizes --repeat 3 \
+            --csv "$out/cache/$model.csv" --chart "$out/cache/$model.png" >/dev/null
     done
 }
 
