@@ -93,8 +93,10 @@ QP_FUNCTION int QP_NAME(cache_find)(const QP_NAME(cache) * c, uint number, QP_NA
     return 0;
 }
 
-/* The way of a set that is to go (generalised clock: A. J. Smith, "Sequentiality and prefetching in database systems", ACM TODS
- * 3(3), 1978): the hand passes over those that have chances left, and takes one from each. */
+/* The way of a set that a point with so many chances is to have, or QP_CACHE_MOST_WAYS: an empty one, else the one that is to go
+ * (generalised clock: A. J. Smith, "Sequentiality and prefetching in database systems", ACM TODS 3(3), 1978): the hand passes over those
+ * that have chances left, and takes one from each. Policy SHARED: a point has as many chances as other patches are to ask for it, and
+ * uses them up as they do; one that nobody else asks for drives nobody out. */
 QP_FUNCTION uint QP_NAME(cache_victim)(const QP_NAME(cache) * c, uint set, uint chances) {
     if (c->ways == 1u) return 0;
     volatile __global uint *word = c->tags + 2u * (ulong)c->places + set;
@@ -106,6 +108,7 @@ QP_FUNCTION uint QP_NAME(cache_victim)(const QP_NAME(cache) * c, uint set, uint 
         empty = 1;
     }
     if (!empty) {
+        if (chances == 0u) return QP_CACHE_MOST_WAYS;
         while (QP_NAME(cache_chance)(state, way) != 0u) {
             state -= 1u << QP_CACHE_CHANCE(way);
             way = way + 1u == c->ways ? 0u : way + 1u;
@@ -133,7 +136,7 @@ QP_FUNCTION void QP_NAME(cache_insert)(const QP_NAME(cache) * c, uint number, co
     }
     if (c->sets == 0u) return;
     const uint set = number % c->sets;
-    uint chances = 0u;
+    uint chances = 1u;
     if (c->policy == QP_CACHE_IS_SHARED) {
         const uint shares = qp_word_load(c->seen + 2u * (ulong)number + 1u);
         chances = shares > 8u ? 7u : shares - 1u;
@@ -143,7 +146,9 @@ QP_FUNCTION void QP_NAME(cache_insert)(const QP_NAME(cache) * c, uint number, co
         fate->duplicate |= lane;
         return;
     }
-    const ulong place = (ulong)set * c->ways + QP_NAME(cache_victim)(c, set, chances);
+    const uint way = QP_NAME(cache_victim)(c, set, chances);
+    if (way == QP_CACHE_MOST_WAYS) return;
+    const ulong place = (ulong)set * c->ways + way;
     volatile __global uint *tag = c->tags + 2u * place;
     const uint version = qp_word_load(tag);
     if ((version & 1u) != 0u || !qp_atomic_swap(tag, version, version + 1u)) return; /* somebody writes there already */

@@ -12,7 +12,8 @@ __kernel void QP_NAME(fused)(__global const uint *heads, __global const uint *tr
     __local real ring_x[QP_HULL_CHUNK];
     __local real ring_y[QP_HULL_CHUNK];
     __local real ring_z[QP_HULL_CHUNK];
-    __local ring_patch place;
+    __local uint ticket_of_group, points_of_group, first_of_group;
+    ring_patch patch; /* the leader's */
     const int leads = get_local_id(0) == 0;
     __global real *memory = points + 4u * QP_RB_MARGIN;
     const uint point_words = (uint)sizeof(real);
@@ -22,26 +23,25 @@ __kernel void QP_NAME(fused)(__global const uint *heads, __global const uint *tr
          * waits for memory. There is such a patch, for this group has not had its own. */
         const uint next = qp_atomic_load(ring + QP_RB_TICKET);
         uint rows = ring_points(heads, entries + ((ulong)first_entry + next) * QP_ENTRY_WORDS);
-        ring_patch patch = ring_begin(ring);
+        ring_begin(ring, &patch);
         if (patch.ticket != next)
             rows = ring_points(heads, entries + ((ulong)first_entry + patch.ticket) * QP_ENTRY_WORDS);
         ring_allocate(ring, (__global uint *)memory, point_words, rows, &patch);
-        place = patch;
+        ticket_of_group = patch.ticket;
+        points_of_group = patch.points;
+        first_of_group = patch.first;
     }
     barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
-    const uint ticket = place.ticket;
+    const uint ticket = ticket_of_group;
     __global const uint *entry = entries + ((ulong)first_entry + ticket) * QP_ENTRY_WORDS;
-    __global real *own = memory + 4u * (ulong)place.first;
+    __global real *own = memory + 4u * (ulong)first_of_group;
     QP_NAME(hull_patch)
-    (heads, trees, reals, rings, positions, entry, place.points, own, ring_x, ring_y, ring_z);
+    (heads, trees, reals, rings, positions, entry, points_of_group, own, ring_x, ring_y, ring_z);
     barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
     if (leads) ring_tick(ring, ticket, QP_TICK_HULLED);
     QP_NAME(domain_patch)
     (heads, trees, reals, rings, positions, entry, (__global const real4 *)own, grid_u, grid_v, vertices,
      flags, derivatives, want_derivatives);
     barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);
-    if (leads) {
-        const ring_patch patch = place;
-        ring_retire(ring, (__global const uint *)memory, point_words, patch);
-    }
+    if (leads) ring_retire(ring, (__global const uint *)memory, point_words, &patch);
 }

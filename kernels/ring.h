@@ -89,17 +89,15 @@ QP_FUNCTION uint ring_points(__global const uint *heads, __global const uint *en
     return heads[entry[QP_ENTRY_HEAD] + QP_HEAD_ROWS + entry[QP_ENTRY_LEVEL]];
 }
 
-QP_FUNCTION ring_patch ring_begin(volatile __global uint *ring) {
-    ring_patch p;
-    p.ticket = qp_atomic_add(ring + QP_RB_TICKET, 1u);
-    p.points = p.first = p.span = 0;
-    p.slot = QP_RB_NO_SLOT;
+QP_FUNCTION void ring_begin(volatile __global uint *ring, ring_patch *p) {
+    p->ticket = qp_atomic_add(ring + QP_RB_TICKET, 1u);
+    p->points = p->first = p->span = 0;
+    p->slot = QP_RB_NO_SLOT;
     if ((ring[QP_RB_OPTIONS] & QP_RB_TRACE) != 0) {
-        p.slot = ring_take_slot(ring);
-        qp_atomic_store(ring_record(ring, p.ticket) + QP_RECORD_SLOT, p.slot);
-        ring_tick(ring, p.ticket, QP_TICK_START);
+        p->slot = ring_take_slot(ring);
+        qp_atomic_store(ring_record(ring, p->ticket) + QP_RECORD_SLOT, p->slot);
+        ring_tick(ring, p->ticket, QP_TICK_START);
     }
-    return p;
 }
 
 /* A word that only the caller changes is at least this. */
@@ -205,42 +203,42 @@ QP_FUNCTION void ring_sweep(volatile __global uint *ring) {
 
 /* Are the canaries of p alive? */
 QP_FUNCTION int ring_is_whole(volatile __global uint *ring, __global const uint *memory, uint point_words,
-                              ring_patch p) {
+                              const ring_patch *p) {
     const uint guard = (ring[QP_RB_OPTIONS] & QP_RB_CANARIES) != 0 ? QP_RB_GUARD : 0u;
     uint dead = 0;
     for (uint i = 0; i < guard * point_words; ++i) {
-        dead |= memory[(ulong)(p.first - guard) * point_words + i] ^ QP_RB_CANARY(p.ticket);
-        dead |= memory[(ulong)(p.first + p.points) * point_words + i] ^ QP_RB_CANARY(p.ticket);
+        dead |= memory[(ulong)(p->first - guard) * point_words + i] ^ QP_RB_CANARY(p->ticket);
+        dead |= memory[(ulong)(p->first + p->points) * point_words + i] ^ QP_RB_CANARY(p->ticket);
     }
     return dead == 0;
 }
 
 /* Reports p if they are not. */
 QP_FUNCTION void ring_inspect(volatile __global uint *ring, __global const uint *memory, uint point_words,
-                              ring_patch p) {
+                              const ring_patch *p) {
     if (ring_is_whole(ring, memory, point_words, p)) return;
     qp_atomic_add(ring + QP_RB_BROKEN, 1u);
-    qp_atomic_store(ring + QP_RB_FIRST_BROKEN, p.ticket + 1u);
+    qp_atomic_store(ring + QP_RB_FIRST_BROKEN, p->ticket + 1u);
 }
 
 QP_FUNCTION void ring_retire(volatile __global uint *ring, __global const uint *memory, uint point_words,
-                             ring_patch p) {
+                             const ring_patch *p) {
     ring_inspect(ring, memory, point_words, p);
-    ring_tick(ring, p.ticket, QP_TICK_DONE);
+    ring_tick(ring, p->ticket, QP_TICK_DONE);
     const uint options = ring[QP_RB_OPTIONS];
-    volatile __global uint *record = ring_record(ring, p.ticket);
+    volatile __global uint *record = ring_record(ring, p->ticket);
     if ((options & (QP_RB_IN_ORDER | QP_RB_TRACE)) != QP_RB_IN_ORDER)
-        qp_atomic_store(record + QP_RECORD_POINTS, p.points);
+        qp_atomic_store(record + QP_RECORD_POINTS, p->points);
     qp_release();
     if ((options & QP_RB_IN_ORDER) != 0) {
-        for (uint round = 0; qp_atomic_load(ring + QP_RB_RETIRED) != p.ticket; ++round) qp_wait(round);
+        for (uint round = 0; qp_atomic_load(ring + QP_RB_RETIRED) != p->ticket; ++round) qp_wait(round);
         qp_acquire();
-        ring_give_back(ring, p.ticket, p.span, p.points);
+        ring_give_back(ring, p->ticket, p->span, p->points);
     } else {
-        qp_atomic_store(record + QP_RECORD_SPAN, p.span + 1u);
+        qp_atomic_store(record + QP_RECORD_SPAN, p->span + 1u);
         ring_sweep(ring);
     }
-    ring_give_slot(ring, p.slot);
+    ring_give_slot(ring, p->slot);
     qp_atomic_add(ring + QP_RB_ENDED, 1u);
 }
 

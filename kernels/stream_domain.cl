@@ -22,7 +22,7 @@ __kernel void QP_NAME(stream_domain)(__global const uint *heads, __global const 
         patch.points = entry[QP_ENTRY_ROWS];
         patch.first = first;
         patch.slot = QP_RB_NO_SLOT;
-        ring_inspect(ring, (__global const uint *)memory, (uint)sizeof(real), patch);
+        ring_inspect(ring, (__global const uint *)memory, (uint)sizeof(real), &patch);
         ring_tick(ring, patch.ticket, QP_TICK_DONE);
         qp_atomic_sub(ring + QP_RB_LIVE, patch.points);
         qp_atomic_sub(ring + QP_RB_IN_FLIGHT, 1u);
