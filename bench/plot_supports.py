@@ -23,7 +23,7 @@ POLICIES = {
     "all": (BLACK, "D", "all points (the paper's)"),
     "direct": (BLUE, "o", "direct-mapped"),
     "clock": (ORANGE, "s", "sets, clock"),
-    "levels": (GREEN, "^", "sets, shared points stay"),
+    "shared": (GREEN, "^", "sets, shared points stay"),
 }
 
 
@@ -39,7 +39,7 @@ def size_axis(axes, sizes):
     axes.set_xscale("log", base=2)
     low, high = min(sizes).bit_length() - 1, max(sizes).bit_length()
     step = max(1, -(-(high - low) // 9))
-    axes.xaxis.set_major_locator(matplotlib.ticker.FixedLocator([2.0 ** e for e in range(low, high + 1, step)]))
+    axes.xaxis.set_major_locator(matplotlib.ticker.FixedLocator([2.0 ** e for e in range(low, high + 1, step) if 2.0 ** e <= max(sizes) * 1.3]))
     axes.xaxis.set_minor_locator(matplotlib.ticker.NullLocator())
     axes.xaxis.set_major_formatter(matplotlib.ticker.FuncFormatter(size_text))
     axes.tick_params(axis="x", labelsize=8.5)
@@ -171,8 +171,8 @@ def draw_cache(result):
                      "time, scratch = 1")
     panels[2].axhline(1, color=GREY, linewidth=1)
     panels[0].legend(fontsize=8.5, loc="lower right")
-    figure.suptitle("%s: cache of control points, patches issued by %s" % (
-        os.path.splitext(result["mesh"])[0], result["issue"]), y=0.985, fontsize=12)
+    figure.suptitle("%s: cache of control points, patches issued %s" % (
+        os.path.splitext(result["mesh"])[0], "by their plans" if result["issue"] == "plan" else "in the mesh's order"), y=0.985, fontsize=12)
     figure.subplots_adjust(left=0.05, right=0.99, top=0.86, bottom=0.125, wspace=0.2)
     return figure
 

@@ -209,7 +209,8 @@ typedef enum qp_cache_policy {
         0, /* the paper's: a place for every distinct control point, and a valid bit each; cache_bytes is not used */
     QP_CACHE_DIRECT = 1, /* bounded, direct-mapped */
     QP_CACHE_CLOCK = 2,  /* bounded, set-associative, second chance (clock) within a set */
-    QP_CACHE_LEVELS = 3  /* clock, but points that fewer patches share never drive out points that more do */
+    QP_CACHE_SHARED =
+        3 /* clock, but a point stays until as many patches have asked for it as share it, and one of a single patch drives none out */
 } qp_cache_policy;
 
 /* Zero-initialise for scratch. */
@@ -238,7 +239,8 @@ typedef struct qp_supports_report {
         peak_bytes; /* most that were allocated and not yet released at one time; of a cache, that were valid */
     uint64_t allocations, allocated_bytes;
     /* Ring. */
-    uint64_t stalls; /* allocations that had to wait for room; in the streamed schedule launches of the hull stage that had to */
+    uint64_t
+        stalls; /* allocations that had to wait for room; in the streamed schedule launches of the hull stage that had to */
     double
         stall_ms; /* how long they waited, all together; 0 where the device has no clock that kernels can read */
     uint64_t wraps;        /* times the ring began anew at its start */
@@ -362,7 +364,8 @@ QP_API qp_status qp_frame_eval_points(qp_frame *frame, uint64_t count, const uin
 typedef struct qp_chunk {
     uint64_t first_sample, first_triangle; /* of the whole stream */
     uint32_t first_patch, n_patches;
-    qp_stream stream; /* the piece; triangles count its samples from 0; it has no hash. Its arrays live until the consumer returns */
+    qp_stream
+        stream; /* the piece; triangles count its samples from 0; it has no hash. Its arrays live until the consumer returns */
 } qp_chunk;
 
 /* Takes one piece; anything but QP_OK ends the evaluation with that status, and with the message in *err, if it is filled in. */
@@ -370,9 +373,10 @@ typedef qp_status (*qp_chunk_consumer)(void *context, const qp_chunk *chunk, qp_
 
 /* What an evaluation in pieces came to. */
 typedef struct qp_chunks {
-    qp_stream stream; /* sums over the pieces (of what is held at one time, the most), the hash of the whole where asked for, no arrays */
+    qp_stream
+        stream; /* sums over the pieces (of what is held at one time, the most), the hash of the whole where asked for, no arrays */
     uint64_t n_chunks;
-    uint64_t n_ghosts;          /* samples of patches of other pieces that were evaluated once more, all together */
+    uint64_t n_ghosts; /* samples of patches of other pieces that were evaluated once more, all together */
     uint64_t peak_vertex_bytes; /* most that one piece had, ghosts included, derivatives apart */
     double set_up_ms;           /* laying out all pieces, factors and deeper plans included */
     double consumer_ms;         /* the consumer and the hash */

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char *const policies[] = {"all", "direct", "clock", "levels"};
+static const char *const policies[] = {"all", "direct", "clock", "shared"};
 static const char *const orders[] = {"plan", "patch"};
 
 static double hit_rate(const cache_row *row) {

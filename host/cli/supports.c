@@ -7,7 +7,7 @@ static const char *const kinds[] = {"scratch", "ring", "cache"};
 static const char *const schedules[] = {"fused", "streamed"};
 static const char *const retirements[] = {"in-order", "out-of-order"};
 static const char *const orders[] = {"plan", "patch"};
-static const char *const policies[] = {"all", "direct", "clock", "levels"};
+static const char *const policies[] = {"all", "direct", "clock", "shared"};
 
 static qp_status only_with(const char *option, const char *with, qp_error *err) {
     return qp_fail(err, QP_BAD_INPUT, "%s goes with %s only", option, with);
@@ -21,7 +21,6 @@ qp_status cli_supports_get(const cli_supports_options *o, qp_supports_options *s
     } uses[] = {{"--ring-bytes", o->ring_given, QP_SUPPORTS_RING},
                 {"--schedule", o->schedule_given, QP_SUPPORTS_RING},
                 {"--retire", o->retirement_given, QP_SUPPORTS_RING},
-                {"--issue", o->issue_given, QP_SUPPORTS_RING},
                 {"--canaries", o->canaries, QP_SUPPORTS_RING},
                 {"--trace", o->trace != NULL, QP_SUPPORTS_RING},
                 {"--cache-bytes", o->cache_given, QP_SUPPORTS_CACHE},
@@ -31,8 +30,10 @@ qp_status cli_supports_get(const cli_supports_options *o, qp_supports_options *s
         return only_with(uses[i].name,
                          uses[i].kind == QP_SUPPORTS_RING ? "--supports ring" : "--supports cache", err);
     }
+    if (o->issue_given && o->kind == QP_SUPPORTS_SCRATCH)
+        return only_with("--issue", "--supports ring or cache", err);
     if (o->cache_given && o->policy == QP_CACHE_ALL)
-        return only_with("--cache-bytes", "--cache-policy direct, clock or levels", err);
+        return only_with("--cache-bytes", "--cache-policy direct, clock or shared", err);
     *supports = (qp_supports_options){
         .kind = (qp_supports_kind)o->kind,
         .ring_bytes = o->ring_bytes,

@@ -8,7 +8,7 @@
 #define CLI_SCHEDULES "fused|streamed"
 #define CLI_RETIREMENTS "in-order|out-of-order"
 #define CLI_ISSUE_ORDERS "plan|patch"
-#define CLI_CACHE_POLICIES "all|direct|clock|levels"
+#define CLI_CACHE_POLICIES "all|direct|clock|shared"
 
 typedef struct cli_supports_options {
     int kind, schedule, retirement, issue, policy; /* indices into the words above, which are the API's values */

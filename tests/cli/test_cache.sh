@@ -14,7 +14,7 @@ keys cache mesh device precision repeat passes rows
 value 'all(k in r for r in o["rows"] for k in ("cache_bytes", "passes", "policy", "hit_rate", "points_computed",
  "points_needed", "relative_hull_time"))'
 value '[p["tess"] for p in o["passes"]] == [16, 8, 4]'
-value 'len(o["rows"]) == 3 * (1 + 3 * 5) and {r["policy"] for r in o["rows"]} == {"all", "direct", "clock", "levels"}'
+value 'len(o["rows"]) == 3 * (1 + 3 * 5) and {r["policy"] for r in o["rows"]} == {"all", "direct", "clock", "shared"}'
 value 'all(r["points_computed"] == r["misses_cold"] + r["misses_capacity"] + r["misses_conflict"] and
  r["hits"] + r["points_computed"] == r["points_needed"] and abs(r["hit_rate"] - r["hits"] / r["points_needed"]) < 1e-5 for r in o["rows"])'
 value 'all(r["relative_hull_time"] > 0 for r in o["rows"])'

@@ -102,7 +102,7 @@ static void check_policies(qp_device *device, const qp_mesh *mesh, qp_precision 
     const uint64_t want = scratch_hash(device, surface, precision, factor, &needed);
     check_policy(device, surface, precision, (qp_supports_options){.kind = QP_SUPPORTS_CACHE}, factor, want,
                  needed);
-    for (int policy = QP_CACHE_DIRECT; policy <= QP_CACHE_LEVELS; ++policy) {
+    for (int policy = QP_CACHE_DIRECT; policy <= QP_CACHE_SHARED; ++policy) {
         for (size_t k = 0; k < sizeof sizes / sizeof sizes[0]; ++k) {
             if (few && k % 2 == 0) continue;
             const qp_supports_options supports = {.kind = QP_SUPPORTS_CACHE,
@@ -345,7 +345,7 @@ static void check_threads(qp_device *device) {
         if (mesh == NULL) continue;
         set_threads(8);
         check_policies(device, mesh, k == 1 ? QP_DOUBLE : QP_FLOAT, 7, SLOW || k != 0);
-        for (int policy = QP_CACHE_ALL; policy <= QP_CACHE_LEVELS; ++policy) {
+        for (int policy = QP_CACHE_ALL; policy <= QP_CACHE_SHARED; ++policy) {
             const qp_supports_options supports = {
                 .kind = QP_SUPPORTS_CACHE, .cache_policy = (qp_cache_policy)policy, .cache_bytes = 4096};
             set_threads(policy == QP_CACHE_CLOCK ? 1 : 8);
