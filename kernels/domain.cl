@@ -357,7 +357,7 @@ QP_FUNCTION void QP_NAME(replacement_write)(const QP_NAME(replacement) * r, real
 }
 
 /* All samples of an entry, by the whole work-group, from its control points. */
-QP_FUNCTION void QP_NAME(domain_patch)(__global const uint *heads, __global const uint *trees,
+QP_STAGE void QP_NAME(domain_patch)(__global const uint *heads, __global const uint *trees,
                                        __global const real *reals, __global const uint *rings,
                                        __global const real *positions, __global const uint *entry,
                                        __global const real4 *points, __global const real *grid_u,

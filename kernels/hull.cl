@@ -142,7 +142,7 @@ QP_FUNCTION void QP_NAME(hull_write_block)(const QP_NAME(hull_job) * job, uint i
 
 /* The first `rows` points of an entry, by the whole work-group, into `out`. ring_x, ring_y, ring_z: QP_HULL_CHUNK reals of local memory each.
  * Ends without a barrier: what items wrote is theirs until then. */
-QP_FUNCTION void QP_NAME(hull_patch)(__global const uint *heads, __global const uint *trees,
+QP_STAGE void QP_NAME(hull_patch)(__global const uint *heads, __global const uint *trees,
                                      __global const real *reals, __global const uint *rings,
                                      __global const real *positions, __global const uint *entry, uint rows,
                                      __global real *out, __local real *ring_x, __local real *ring_y,

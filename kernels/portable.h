@@ -22,6 +22,8 @@
 #endif
 #define QP_NAME(name) name
 #define QP_FUNCTION static inline __attribute__((always_inline))
+/* A whole stage, which several kernels call: the host compiles it once. */
+#define QP_STAGE QP_FUNCTION
 #define QP_GROUP /* a kernel's last parameter on the host: which work-group it is */
 
 /* Words that work-groups share. OpenCL 1.2's atomics order nothing else: qp_release() comes after the writes of a work-item
@@ -41,8 +43,13 @@
 #define qp_release() mem_fence(CLK_GLOBAL_MEM_FENCE)
 #define qp_acquire() mem_fence(CLK_GLOBAL_MEM_FENCE)
 /* One word, whole, in no order with others but by qp_acquire and qp_release. */
+#ifdef QP_WORD_ATOMICS /* for a checker of races, which takes words to be shared on purpose by their atomics */
+#define qp_word_load(p) atomic_add((volatile __global uint *)(p), 0u)
+#define qp_word_store(p, value) ((void)atomic_xchg((volatile __global uint *)(p), (value)))
+#else
 #define qp_word_load(p) (*(volatile __global const uint *)(p))
 #define qp_word_store(p, value) ((void)(*(volatile __global uint *)(p) = (value)))
+#endif
 /* A word of local memory, to tell or count among the items of a group. */
 #define qp_local_add(p, value) atomic_add((p), (value))
 #define qp_popcount(x) popcount(x)
@@ -86,6 +93,7 @@ QP_FUNCTION void qp_wait(uint round) {
 #else
 #define QP_FUNCTION static inline __attribute__((always_inline))
 #endif
+#define QP_STAGE static __attribute__((noinline))
 #define QP_GROUP , size_t qp_group
 #define qp_atomic_load(p) __atomic_load_n((p), __ATOMIC_ACQUIRE)
 #define qp_atomic_store(p, value) __atomic_store_n((p), (value), __ATOMIC_RELEASE)
