@@ -40,7 +40,7 @@ __kernel void QP_NAME(stream_hull)(__global const uint *heads, __global const ui
             qp_atomic_add(ring + QP_RB_ALLOCATED + 1u, 1u);
         qp_atomic_max(ring + QP_RB_PEAK, qp_atomic_add(ring + QP_RB_LIVE, patch.points) + patch.points);
         qp_atomic_max(ring + QP_RB_MOST_IN_FLIGHT, qp_atomic_add(ring + QP_RB_IN_FLIGHT, 1u) + 1u);
-        qp_atomic_store(ring_record(ring, patch.ticket) + QP_RECORD_POINTS, patch.points);
+        ring_record(ring, patch.ticket)[QP_RECORD_POINTS] = patch.points;
         ring_tick(ring, patch.ticket, QP_TICK_ALLOCATED);
         place = patch;
     }
