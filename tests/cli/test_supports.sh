@@ -42,6 +42,7 @@ for device in host ""; do
 done
 same "by patch" --device host --supports ring --ring-bytes 8K --issue patch
 value 'o["supports"]["issue"] == "patch" and o["supports"]["capacity_bytes"] == 8192'
+same "cache by patch" --device host --supports cache --issue patch
 same "cache" --device host --supports cache --repeat 2
 value 'o["supports"]["kind"] == "cache" and o["supports"]["policy"] == "all"'
 value 'o["supports"]["hits"] == o["supports"]["points_needed"] and o["supports"]["misses"] == 0'
@@ -59,10 +60,11 @@ value 'o["supports"]["kind"] == "ring" and o["supports"]["capacity_bytes"] == 1 
 refuses "a ring of nothing" 2 'too small: patch [0-9]+ needs [0-9]+ bytes' eval "$mesh" --supports ring --ring-bytes 0
 refuses "a ring too small by a byte" 2 "needs $largest bytes" eval "$mesh" --tess 9 --supports ring \
     --ring-bytes $((largest - 1)) --schedule streamed
-for option in "--ring-bytes 1M" "--schedule streamed" "--retire in-order" "--issue patch" --canaries "--trace $work/no.json"; do
+for option in "--ring-bytes 1M" "--schedule streamed" "--retire in-order" --canaries "--trace $work/no.json"; do
     # shellcheck disable=SC2086
     refuses "$option without a ring" 2 "^quadplan: ${option%% *} goes with --supports ring only" eval "$mesh" $option
 done
+refuses "--issue of scratch" 2 '^quadplan: --issue goes with --supports ring or cache only' eval "$mesh" --issue patch
 refuses "--cache-bytes with a ring" 2 'goes with --supports cache' eval "$mesh" --supports ring --cache-bytes 1M
 refuses "--cache-policy with scratch" 2 'goes with --supports cache' eval "$mesh" --cache-policy direct
 refuses "--cache-bytes of all" 2 'goes with --cache-policy' eval "$mesh" --supports cache --cache-bytes 1M
