@@ -46,6 +46,7 @@ static void describe_device(cl_platform_id platform, uint32_t p, cl_device_id id
     info->rounds_correctly = (single & CL_FP_CORRECTLY_ROUNDED_DIVIDE_SQRT) != 0;
     /* Simulators and some compilers for processors that do have fma say no to the first alone. */
     info->slow_fma = (single & (CL_FP_FMA | CL_FP_DENORM)) == 0;
+    info->checks_races = strstr(info->platform, "Oclgrind") != NULL;
 #ifdef __x86_64__
     /* PoCL compiles with clang, whose cycle counter is there the processor's time stamp, the same for all cores. */
     info->has_clock = info->is_cpu && strstr(info->platform, "Portable Computing Language") != NULL;

@@ -12,6 +12,7 @@ typedef struct qp_device_info {
     char name[256], platform[256], version[256];
     bool has_double, is_cpu, rounds_correctly; /* divides and takes roots in float correctly rounded */
     bool slow_fma; /* has no fma in hardware, and its own program for it is to be avoided (kernels/real.h) */
+    bool checks_races; /* Oclgrind */
     bool has_clock; /* that kernels can read: qp_device_ticks */
     bool is_native; /* kernels are x86-64 code that Linux runs, so that they can make system calls */
     uint32_t compute_units;

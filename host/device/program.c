@@ -89,7 +89,7 @@ static void write_options(const qp_device *device, qp_precision precision, unsig
     snprintf(
         options, size,
         "-cl-std=CL1.2%s%s%s -DQP_LANES=%u -DQP_WITH_INTERNAL=%d -DQP_WITH_CREASE=%d -DQP_WITH_TERMINAL=%d "
-        "-DQP_WITH_CORNERS=%d%s%s%s",
+        "-DQP_WITH_CORNERS=%d%s%s%s%s",
         correct ? " -cl-fp32-correctly-rounded-divide-sqrt -DQP_CORRECT_DIVIDE" : "",
         precision == QP_DOUBLE ? " -DQP_REAL_DOUBLE" : "",
         precision == QP_FLOAT && device->info.slow_fma ? " -DQP_SOFT_FMA" : "",
@@ -97,7 +97,8 @@ static void write_options(const qp_device *device, qp_precision precision, unsig
         (plan_flags & QP_PLAN_INTERNAL) != 0, (plan_flags & QP_PLAN_CREASE) != 0,
         (plan_flags & QP_PLAN_TERMINAL) != 0, (plan_flags & QP_PLAN_CORNERS) != 0,
         (kernels & (1u << QP_KERNEL_HULL | 1u << QP_KERNEL_DOMAIN)) != 0 ? "" : " -DQP_WITH_STAGES=0",
-        device->info.has_clock ? " -DQP_KERNEL_CLOCK" : "", device->info.is_native ? " -DQP_KERNEL_YIELD" : "");
+        device->info.has_clock ? " -DQP_KERNEL_CLOCK" : "", device->info.is_native ? " -DQP_KERNEL_YIELD" : "",
+        device->info.checks_races ? " -DQP_WORD_ATOMICS" : "");
 }
 
 static qp_status build_sources(qp_device *device, const char **sources, cl_uint n, const char *options,
