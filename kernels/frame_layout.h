@@ -5,13 +5,13 @@
 
 #define QP_ENTRY_HEAD 0u     /* first word of the plan's head in heads */
 #define QP_ENTRY_ROTATION 1u /* 0..3, see plan_layout.h */
-#define QP_ENTRY_ROWS 2u     /* points to make: rows[level] of the plan */
+#define QP_ENTRY_ROWS 2u     /* points to make, of the plan's */
 #define QP_ENTRY_SAMPLES 3u  /* samples of this entry */
 #define QP_ENTRY_RING 4u     /* 64 bits: first word in rings, see below */
 #define QP_ENTRY_SUPPORT 6u  /* 64 bits: first point in the support buffer */
 #define QP_ENTRY_GRID 8u     /* 64 bits: first (u,v) in the grid */
 #define QP_ENTRY_OUT 10u     /* 64 bits: first sample in the vertex buffer */
-#define QP_ENTRY_LEVEL 12u   /* the level of the tessellation, whose points are made: rows[level] */
+#define QP_ENTRY_LEVEL 12u   /* the level of the patch's tessellation */
 #define QP_ENTRY_ORIGIN 13u  /* base vertex that the patch is relative to */
 #define QP_ENTRY_NUMBERS 14u /* 64 bits: where the numbers of its points begin, or QP_NO_NUMBERS (cache_layout.h) */
 #define QP_ENTRY_WORDS 16u   /* a cache line */

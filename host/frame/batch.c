@@ -1,5 +1,5 @@
 /* Cuts a layout into batches that fit the device, and hands it over. Within a batch the scratch buffer holds
- * each patch's rows[need] control points one after the other: the worst case, as nothing is released before
+ * each patch's control points one after the other: the worst case, as nothing is released before
  * the batch is done. (The paper gives every patch as many points as the deepest one needs; prefix sums cost
  * nothing here, because the host knows every patch's level.) */
 #include "host/frame/frame.h"
@@ -12,17 +12,13 @@ static void put_wide(uint32_t *word, uint64_t value) {
     word[1] = (uint32_t)(value >> 32);
 }
 
-static uint32_t item_rows(const qp_frame *frame, const qp_frame_item *item) {
-    return qp_frame_plan_of(frame, item->patch).plan->rows[item->need];
-}
-
 static void write_entry(const qp_frame *frame, const qp_frame_item *item, const qp_frame_batch *batch,
                         uint64_t support, uint32_t *entry) {
     const qp_frame_plan plan = qp_frame_plan_of(frame, item->patch);
     for (uint32_t i = 0; i < QP_ENTRY_WORDS; ++i) entry[i] = 0;
     entry[QP_ENTRY_HEAD] = plan.index * QP_HEAD_WORDS;
     entry[QP_ENTRY_ROTATION] = plan.rotation;
-    entry[QP_ENTRY_ROWS] = item_rows(frame, item);
+    entry[QP_ENTRY_ROWS] = qp_frame_rows(frame, item);
     entry[QP_ENTRY_SAMPLES] = item->samples;
     entry[QP_ENTRY_LEVEL] = item->level;
     entry[QP_ENTRY_ORIGIN] = qp_frame_origin(plan.surface, item->patch);
@@ -50,7 +46,7 @@ static qp_status cut_batch(qp_frame *frame, size_t begin, size_t *end, uint32_t 
     for (; i < layout->n_items; ++i) {
         const qp_frame_item *item = &layout->items[i];
         const bool fast = qp_frame_is_fast(frame, item->patch);
-        const uint64_t points = fast ? 0 : item_rows(frame, item);
+        const uint64_t points = fast ? 0 : qp_frame_rows(frame, item);
         const bool full = batch->points + points > most_points && !qp_frame_has_ring(frame);
         if (i > begin && (batch->n_samples + item->samples > most_samples || full)) break;
         batch->n_samples += item->samples;
@@ -95,7 +91,7 @@ static void write_batch(qp_frame *frame, const qp_frame_batch *batch, size_t beg
             const uint32_t at = by_patch ? next++ : of_plan;
             qp_ring_note(frame, at, i);
             write_entry(frame, item, batch, support, entries + QP_ENTRY_WORDS * (size_t)at);
-            support += item_rows(frame, item);
+            support += qp_frame_rows(frame, item);
         }
     }
 }

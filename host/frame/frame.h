@@ -78,6 +78,10 @@ typedef struct qp_frame_plan {
     const qp_surface *surface; /* whose plan it is */
 } qp_frame_plan;
 qp_frame_plan qp_frame_plan_of(const qp_frame *frame, uint32_t patch);
+/* Control points that an item's samples need, of the general kernels. */
+static inline uint32_t qp_frame_rows(const qp_frame *frame, const qp_frame_item *item) {
+    return qp_item_rows(qp_frame_plan_of(frame, item->patch).plan, item);
+}
 
 /* Chooses the plans for the layout's samples (of points: within the tolerance of the options, if any), makes deeper ones where they are needed, and uploads what is new. To be called for
  * every layout before qp_frame_upload_layout. */

@@ -190,6 +190,7 @@ static qp_status make_items(qp_layout_maker *m, size_t n_parts, qp_frame_layout 
                                                                .samples = grid->tess.n_points,
                                                                .level = level,
                                                                .need = level,
+                                                               .away = QP_LEVELS - 1,
                                                                .grid = grid->first,
                                                                .out = layout->n_samples,
                                                                .nearest = grid->nearest};
@@ -344,8 +345,7 @@ static void place_runs(const qp_ghosts *ghosts, const ghost_run *runs, size_t n_
             qp_reach_add(&reach, ghost->u, ghost->v);
         }
         item->samples += (uint32_t)runs[r].count;
-        item->need = qp_reach_need(&reach, item->level);
-        item->nearest = reach.corner;
+        qp_item_reach(item, &reach);
     }
 }
 

@@ -11,7 +11,8 @@ typedef struct qp_frame_item {
     uint32_t patch, samples;
     uint32_t
         level; /* of the patch's tessellation: says which normals may be made from samples beside (kernels/domain.cl) */
-    uint32_t need; /* rows[need] of the patch's plan are enough, for those too */
+    uint32_t need; /* rows[need] of the patch's plan are enough, for those too; */
+    uint32_t away; /* and so are corner_rows[away] for the samples alone, but for those at corners */
     uint64_t grid; /* first (u,v) in grid_u, grid_v */
     uint64_t out;  /* first sample in the stream */
     double
@@ -86,13 +87,29 @@ static inline void qp_reach_add(qp_reach *reach, double u, double v) {
     if (far > 0 && far < reach->corner) reach->corner = far;
 }
 
-/* Level whose rows are enough: at level n samples lie on the patch's edges or at least 2^-n away from them; and normals that are
- * replaced in an item of some level take samples at eighths, or in the middle (kernels/domain.cl). */
-static inline uint32_t qp_reach_need(const qp_reach *reach, uint32_t item_level) {
-    const uint32_t beside = item_level < 3 ? item_level : 3;
-    const int n = reach->edge > 1 ? 0 : -ilogb(reach->edge);
-    const uint32_t level = n < (int)QP_LEVELS - 1 ? (uint32_t)n : QP_LEVELS - 1;
-    return level > beside ? level : beside;
+static inline uint32_t qp_reach_level(double distance) {
+    const int n = distance > 1 ? 0 : -ilogb(distance);
+    return n < (int)QP_LEVELS - 1 ? (uint32_t)n : QP_LEVELS - 1;
+}
+
+/* Normals that are replaced in an item of some level take samples at eighths, or in the middle (kernels/domain.cl). */
+static inline uint32_t qp_item_beside(const qp_frame_item *item) {
+    return item->level < 3 ? item->level : 3;
+}
+
+/* Puts into an item what its samples need: at level n they lie on the patch's edges or at least 2^-n away from them. */
+static inline void qp_item_reach(qp_frame_item *item, const qp_reach *reach) {
+    const uint32_t level = qp_reach_level(reach->edge), beside = qp_item_beside(item);
+    item->need = level > beside ? level : beside;
+    item->away = qp_reach_level(reach->corner);
+    item->nearest = reach->corner;
+}
+
+/* Points of the plan that an item needs. */
+static inline uint32_t qp_item_rows(const qp_plan *plan, const qp_frame_item *item) {
+    const uint32_t beside = plan->rows[qp_item_beside(item)], away = plan->corner_rows[item->away];
+    const uint32_t rows = beside > away ? beside : away;
+    return rows < plan->rows[item->need] ? rows : plan->rows[item->need];
 }
 
 #endif

@@ -42,8 +42,7 @@ static void find_needs(void *context, size_t begin, size_t end, unsigned worker)
         qp_reach reach = QP_REACH_NONE;
         for (size_t k = (size_t)item->grid; k < (size_t)item->grid + item->samples; ++k)
             qp_reach_add(&reach, layout->grid_u[k], layout->grid_v[k]);
-        item->need = qp_reach_need(&reach, item->level);
-        item->nearest = reach.corner;
+        qp_item_reach(item, &reach);
     }
 }
 

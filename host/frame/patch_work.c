@@ -9,7 +9,7 @@ static qp_patch_work work_of(const qp_surface *surface, const qp_frame_item *ite
     const qp_plan *plan = surface->plans[index];
     qp_patch_work work = {.patch = item->patch, .samples = item->samples};
     const bool regular = index == surface->regular_plan;
-    work.points = regular ? regular_points : plan->rows[item->need];
+    work.points = regular ? regular_points : qp_item_rows(plan, item);
     work.ring = regular ? 1 : plan->ring_size;
     return work;
 }

@@ -38,7 +38,7 @@ static uint32_t largest_patch(const qp_frame *frame, uint32_t *patch) {
     for (size_t i = 0; i < frame->layout.n_items; ++i) {
         const qp_frame_item *item = &frame->layout.items[i];
         if (qp_frame_is_fast(frame, item->patch)) continue;
-        const uint32_t points = qp_frame_plan_of(frame, item->patch).plan->rows[item->need];
+        const uint32_t points = qp_frame_rows(frame, item);
         if (points <= most) continue;
         most = points;
         *patch = item->patch;

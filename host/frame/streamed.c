@@ -75,7 +75,7 @@ static void place(qp_streamed *s, uint32_t capacity, uint32_t *head, uint32_t *c
 static uint32_t points_of(const qp_frame *frame, uint32_t entry) {
     const qp_frame_item *item = &frame->layout.items[frame->ring.items[entry]];
     const uint32_t guards = frame->options.supports.canaries ? 2 * QP_RB_GUARD : 0;
-    return qp_frame_plan_of(frame, item->patch).plan->rows[item->level] + guards;
+    return qp_frame_rows(frame, item) + guards;
 }
 
 qp_status qp_streamed_plan(qp_frame *frame, qp_error *err) {

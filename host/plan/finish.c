@@ -105,6 +105,7 @@ qp_plan *qp_plan_finish(qp_builder *b) {
     plan->rows[QP_LEVELS - 1] = count;
     renumber_tree(plan, index);
     qp_plan_anchor(plan);
+    qp_plan_find_reach(plan);
     free(index);
     return plan;
 }

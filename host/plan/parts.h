@@ -91,6 +91,8 @@ void qp_plan_put_tail(qp_builder *b, uint32_t level, qp_item *item);
 
 /* anchor.c: fills point_anchors and base of a plan that is otherwise finished. */
 void qp_plan_anchor(qp_plan *plan);
+/* Fills in corner_rows; the tree is final. */
+void qp_plan_find_reach(qp_plan *plan);
 /* mode.c: splits the rings of a chain that has an origin, where they tend to one vector. The point of that vector, or QP_NO_POINT. */
 uint32_t qp_plan_split_mode(qp_builder *b, const qp_chain *chain, const qp_fan *fan, uint32_t level);
 

@@ -10,6 +10,8 @@ typedef struct qp_plan {
     uint32_t ring_size, point_count, tree_words, constant_count, node_count;
     uint32_t flags;           /* QP_PLAN_* */
     uint32_t rows[QP_LEVELS]; /* points needed at level <= n */
+    uint32_t
+        corner_rows[QP_LEVELS]; /* points needed by samples that lie 2^-n or more (by the larger coordinate) from all corners */
     uint32_t *tree;           /* [tree_words], root at 0 */
     double *weights;          /* [point_count * ring_size], row-major: a row is one stencil */
     uint8_t *point_kinds;     /* [point_count] what each point is (host/plan/build.h), for info */

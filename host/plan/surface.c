@@ -218,7 +218,7 @@ static qp_plan *regular_plan(void) {
         plan->point_origins[i] = QP_NO_POINT;
         plan->tree[2 + i / 2] |= i << (i % 2 * 16);
     }
-    for (uint32_t n = 0; n < QP_LEVELS; ++n) plan->rows[n] = 16;
+    for (uint32_t n = 0; n < QP_LEVELS; ++n) plan->rows[n] = plan->corner_rows[n] = 16;
     return plan;
 }
 
