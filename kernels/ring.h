@@ -193,7 +193,6 @@ QP_FUNCTION void ring_sweep(volatile __global uint *ring) {
             const uint span = qp_atomic_load(record + QP_RECORD_SPAN);
             if (span == 0) break;
             qp_acquire();
-            qp_atomic_store(record + QP_RECORD_SPAN, 0u);
             ring_give_back(ring, ticket, span - 1u, qp_atomic_load(record + QP_RECORD_POINTS));
         }
         qp_release();

@@ -2,9 +2,8 @@
  * a patch, in the order in which patches are issued. The control points themselves lie in a buffer of their own. All are 32-bit words; a
  * count that may outgrow one takes two, low word first.
  *
- * Positions and sizes are in control points. The host writes all words of the ring before an evaluation: capacity and options, the rest 0.
- * Launches of one evaluation (batches) go on where the one before stopped, with the ring empty. Of records, QP_RECORD_SPAN is 0 then,
- * and again afterwards. */
+ * Positions and sizes are in control points. The host writes all words before an evaluation: capacity and options, the rest 0. Launches
+ * of one evaluation (batches) go on where the one before stopped, with the ring empty. */
 #ifndef QP_RING_LAYOUT_H
 #define QP_RING_LAYOUT_H
 
@@ -64,8 +63,7 @@
 #define QP_RB_WORDS 96u
 
 /* A patch's record. All have the first two words; the rest is there with QP_RB_TRACE. */
-/* 0, or, once it is done and until they are given back (out of order), 1 + the points it took from the ring, with what was skipped
- * before them and its canaries. */
+/* 0, or, once it is done (out of order), 1 + the points it took from the ring, with what was skipped before them and its canaries. */
 #define QP_RECORD_SPAN 0u
 #define QP_RECORD_POINTS 1u /* when it is done */
 #define QP_RECORD_SLOT 2u

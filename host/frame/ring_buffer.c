@@ -78,7 +78,6 @@ qp_status qp_ring_reserve(qp_frame *frame, qp_error *err) {
         ring->since_ticks = qp_device_ticks(frame->device);
     }
     const size_t bytes = word_bytes(frame);
-    if (ring->words.bytes < bytes) ring->cleared = false;
     qp_status status =
         qp_buffer_reserve(frame->device, &ring->words, bytes, "the ring buffer's records", err);
     if (status != QP_OK) return status;
@@ -104,11 +103,9 @@ static qp_status fill_with_canaries(qp_frame *frame, qp_error *err) {
 
 qp_status qp_ring_reset(qp_frame *frame, qp_error *err) {
     const qp_supports_options *supports = &frame->options.supports;
-    /* An evaluation that came to its end has left its records as they are to be. */
-    const size_t bytes = frame->ring.cleared ? QP_RB_WORDS * sizeof(uint32_t) : word_bytes(frame);
+    const size_t bytes = word_bytes(frame);
     uint32_t *words = qp_alloc(bytes, 1, true);
     if (words == NULL) return qp_fail_memory(err, bytes, "the ring buffer's records");
-    frame->ring.cleared = false;
     words[QP_RB_CAPACITY] = frame->ring.capacity;
     words[QP_RB_OPTIONS] = (supports->retirement == QP_RETIRE_IN_ORDER ? QP_RB_IN_ORDER : 0) |
                            (supports->canaries ? QP_RB_CANARIES : 0) | (supports->trace ? QP_RB_TRACE : 0);
@@ -235,7 +232,6 @@ qp_status qp_ring_report(qp_frame *frame, qp_stream *stream, qp_error *err) {
     if (words[QP_RB_RETIRED] != frame->ring.n_tickets)
         return qp_fail(err, QP_SYSTEM, "ring buffer: %u of %u patches retired on %s", words[QP_RB_RETIRED],
                        frame->ring.n_tickets, qp_device_name(frame->device));
-    frame->ring.cleared = true;
     const double ticks_per_ms = words[QP_RB_STALLS] != 0 || supports->trace ? tick_rate(frame) : 0;
     qp_supports_report *report = &stream->supports;
     report->capacity_bytes = supports->ring_bytes / bytes * bytes;

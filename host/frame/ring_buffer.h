@@ -12,11 +12,10 @@ struct qp_frame_batch;
 /* Of a frame; zero-initialised. */
 typedef struct qp_ring_buffer {
     qp_buffer words, points; /* kernels/ring_layout.h */
-    bool cleared;            /* records in words are 0, or as an evaluation leaves them */
     uint32_t capacity;       /* points, room for canaries included */
     uint32_t n_tickets;      /* patches that need a ring, of all batches */
-    uint32_t *items;         /* [entries] item of the layout of each; NULL in the fused schedule without a trace */
-    qp_streamed streamed;    /* in the streamed schedule */
+    uint32_t *items; /* [entries] item of the layout of each; NULL in the fused schedule without a trace */
+    qp_streamed streamed; /* in the streamed schedule */
     qp_trace trace;
     qp_trace_patch *patches;
     double since_ms; /* both clocks, when the buffer was made */

@@ -45,8 +45,8 @@ typedef struct storm {
 
 static storm storm_make(uint32_t capacity, uint32_t options, uint32_t n, uint32_t *points) {
     const uint32_t record = (options & QP_RB_TRACE) != 0 ? QP_RECORD_TRACE_WORDS : QP_RECORD_WORDS;
-    storm s = {.words = calloc(QP_RB_WORDS + (size_t)n * record, sizeof(uint32_t)),
-               .memory = calloc((size_t)capacity * POINT_WORDS, sizeof(uint32_t)),
+    storm s = {.words = qp_alloc(QP_RB_WORDS + (size_t)n * record, sizeof(uint32_t), true),
+               .memory = qp_alloc((size_t)capacity * POINT_WORDS, sizeof(uint32_t), true),
                .capacity = capacity,
                .points = points};
     if (!CHECK(s.words != NULL && s.memory != NULL)) exit(1);
