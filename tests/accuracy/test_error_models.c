@@ -1,5 +1,6 @@
-/* Every manifold model against the extended-precision reference: the tessellator's points at factor 16 and 20,000 anywhere, in
- * float and double, on the default OpenCL device. */
+/* Every manifold model against the extended-precision reference: the tessellator's points at factor 16 (more than 2,000 patches in
+ * double: 5) and 20,000 anywhere, in float and double, on the default OpenCL device. QUADPLAN_FULL=1: factor 16 for all, and fractional_odd
+ * factors and points about every corner too. */
 #include "tests/accuracy/measure.h"
 #include "tests/unit/mesh_files.h"
 
@@ -13,6 +14,17 @@ static bool is_manifold(const qp_mesh *mesh) {
     return true;
 }
 
+static void one(const char *name, const qp_surface *surface, qp_precision precision, const char *set,
+                const qp_tessellation *tessellation) {
+    qp_error_report r = {0};
+    if (!measure(surface, device, precision, set, tessellation, CHECK_SANITIZED ? 300 : 20000, 1, &r)) return;
+    measure_add(&sums[precision], &r);
+    if (within_bounds(&r, precision)) return;
+    printf("%s, %s, %s: position %.3g at patch %u (%.9g, %.9g), normal %.3g at patch %u (%.9g, %.9g)\n", name,
+           set, precision == QP_DOUBLE ? "double" : "float", r.position_max, r.worst_patch, r.worst_u,
+           r.worst_v, r.normal_max_deg, r.worst_normal_patch, r.worst_normal_u, r.worst_normal_v);
+}
+
 static void visit(const char *name, qp_mesh *mesh) {
     if (!is_manifold(mesh)) {
         printf("%s: not manifold, left out\n", name);
@@ -21,21 +33,16 @@ static void visit(const char *name, qp_mesh *mesh) {
     qp_error err = {0};
     qp_surface *surface = NULL;
     if (!CHECK_OK(qp_surface_create(mesh, NULL, &surface, &err), err)) return;
-    qp_tessellation tessellation = {.spacing = QP_EQUAL, .factor = CHECK_SANITIZED ? 2.0f : 16.0f};
+    const bool large = mesh->n_patches > 2000 && !check_full();
     for (int precision = 0; precision <= qp_device_has_double(device); ++precision) {
-        for (int random = 0; random < 2; ++random) {
-            qp_error_report r = {0};
-            const char *set = random ? "random" : "grid";
-            if (!measure(surface, device, (qp_precision)precision, set, &tessellation,
-                         CHECK_SANITIZED ? 300 : 20000, 1, &r))
-                continue;
-            measure_add(&sums[precision], &r);
-            if (within_bounds(&r, (qp_precision)precision)) continue;
-            printf(
-                "%s, %s, %s: position %.3g at patch %u (%.9g, %.9g), normal %.3g at patch %u (%.9g, %.9g)\n",
-                name, set, precision ? "double" : "float", r.position_max, r.worst_patch, (double)r.worst_u,
-                (double)r.worst_v, r.normal_max_deg, r.worst_normal_patch, (double)r.worst_normal_u,
-                (double)r.worst_normal_v);
+        const float factor = CHECK_SANITIZED ? 2.0f : large && precision == QP_DOUBLE ? 5.0f : 16.0f;
+        const qp_tessellation equal = {.spacing = QP_EQUAL, .factor = factor},
+                              odd = {.spacing = QP_FRACTIONAL_ODD, .factor = 5.7f};
+        one(name, surface, (qp_precision)precision, "grid", &equal);
+        one(name, surface, (qp_precision)precision, "random", NULL);
+        if (check_full()) {
+            one(name, surface, (qp_precision)precision, "grid", &odd);
+            one(name, surface, (qp_precision)precision, "corner", NULL);
         }
     }
     qp_surface_free(surface);
