@@ -3,7 +3,8 @@
  *   bench_ring [--device D] [--double] [--repeat N] [--bytes N] MESH.obj FACTOR...
  *
  * Lines a factor: scratch, then rings retired in order and out of order, issued by plan and by patch; medians over N repeats (default
- * 21) of the wall clock and of the processor time of all threads, which other programs disturb less, and their ratios to scratch. */
+ * 21) of the wall clock and of the processor time of all threads, which other programs disturb less, their ratios to scratch, and how
+ * long allocations of the last run waited for room. */
 #include "host/base/measure.h"
 #include "host/frame/frame.h"
 
@@ -42,14 +43,15 @@ static qp_status measure(qp_frame *const *frames, float factor, int repeat, qp_e
             processor[v][i] = frames[v]->processor_ms;
         }
     }
-    double wall0 = 0, processor0 = 0;
+    double wall0 = 1, processor0 = 1;
     for (int v = 0; v < VARIANTS; ++v) {
         const double ms = qp_median(wall[v], (size_t)repeat), all = qp_median(processor[v], (size_t)repeat);
         if (v == 0) wall0 = ms, processor0 = all;
         const qp_supports_report *r = &stream[v].supports;
-        printf("%6g  %-22s %9.3f %6.3f %9.3f %6.3f %10" PRIu64 " %9" PRIu64 " %7" PRIu64 " %6" PRIu64 "\n",
+        printf("%6g  %-22s %9.3f %6.3f %9.3f %6.3f %10" PRIu64 " %9" PRIu64 " %7" PRIu64 " %8.3f %6" PRIu64
+               "\n",
                (double)factor, variants[v].name, ms, ms / wall0, all, all / processor0, r->capacity_bytes,
-               r->peak_bytes, r->stalls, r->wraps);
+               r->peak_bytes, r->stalls, r->stall_ms, r->wraps);
     }
     return QP_OK;
 }
@@ -90,8 +92,9 @@ int main(int argc, char **argv) {
         status = qp_frame_create(device, surface, &options, &frames[v], &err);
     }
     if (status == QP_OK)
-        printf("%s on %s\n%6s  %-22s %9s %6s %9s %6s %10s %9s %7s %6s\n", path, qp_device_name(device),
-               "factor", "", "frame ms", "ratio", "cpu ms", "ratio", "capacity", "peak", "stalls", "wraps");
+        printf("%s on %s\n%6s  %-22s %9s %6s %9s %6s %10s %9s %7s %8s %6s\n", path, qp_device_name(device),
+               "factor", "", "frame ms", "ratio", "cpu ms", "ratio", "capacity", "peak", "stalls", "stall ms",
+               "wraps");
     for (; i < argc && status == QP_OK; ++i) status = measure(frames, (float)atof(argv[i]), repeat, &err);
     for (int v = 0; v < VARIANTS; ++v) qp_frame_free(frames[v]);
     qp_device_free(device);
