@@ -53,6 +53,6 @@ const cli_command cli_gen = {
     "gen", "KIND", "Writes a procedural mesh as an OBJ file.",
     "KIND is cube, torus, creased-torus, cubes (the paper's 12 x 12 x 10 grid), fan (n: valence), prism (n: "
     "sides),\n"
-    "terrain (scattered extraordinary vertices), irregular (a torus of triangles, every patch irregular; AxB cells of 6 patches),\n"
+    "terrain (scattered extraordinary vertices), irregular (a torus of AxB cells of 6 quads, none of them regular),\n"
     "random-closed or random-open (random tags, from a seed).",
     run};

@@ -95,8 +95,8 @@ static qp_status generate_cubes(mesh_builder *b, const qp_generate_options *opti
 /* ---- Tori ---- */
 
 /* Vertices of n[0] quads around the axis, n[1] around the tube (24 x 12). */
-static qp_status torus_vertices(mesh_builder *b, const qp_generate_options *options, uint32_t *around, uint32_t *tube,
-                                qp_error *err) {
+static qp_status torus_vertices(mesh_builder *b, const qp_generate_options *options, uint32_t *around,
+                                uint32_t *tube, qp_error *err) {
     qp_status status = generate_size(options, 0, 24, 3, 20000, "torus: quads around the axis", around, err);
     if (status == QP_OK)
         status = generate_size(options, 1, 12, 3, 20000, "torus: quads around the tube", tube, err);
@@ -131,17 +131,50 @@ static qp_status add_torus(mesh_builder *b, const qp_generate_options *options, 
     return QP_OK;
 }
 
-/* One torus of n[0] x n[1] cells (24 x 12), each cut into two triangles along either diagonal, as the seed has it: no patch is regular,
- * and vertices have valences 4 to 8. Cells come in tiles of TILE x TILE, so that patches near each other have numbers near each other. */
+/* One torus of n[0] x n[1] cells (24 x 12), each cut into two triangles along either diagonal, as the seed has it, and each of those
+ * into three quads about its middle: no patch is regular, as all have a vertex of valence 3, and opposite it one of valence 4 to 8.
+ * Cells come in tiles of TILE x TILE, so that patches near each other have numbers near each other. */
 enum { TILE = 8 };
 
-static void add_triangles(mesh_builder *b, uint32_t around, uint32_t tube, uint32_t i, uint32_t j, bool falling) {
+/* The vertex between the ends of an edge of the cells, which `number` tells from others; made where it is used first. */
+static uint32_t middle_vertex(mesh_builder *b, uint32_t *middles, size_t number, uint32_t v0, uint32_t v1) {
+    const double *p = builder_position(b, v0), *q = builder_position(b, v1);
+    if (p == NULL || q == NULL) return 0;
+    if (middles[number] == QP_NONE)
+        middles[number] = builder_vertex(b, (p[0] + q[0]) / 2, (p[1] + q[1]) / 2, (p[2] + q[2]) / 2);
+    return middles[number];
+}
+
+/* Three quads of a triangle of vertices v, with m[k] between v[k] and the next one. */
+static void add_thirds(mesh_builder *b, const uint32_t v[3], const uint32_t m[3]) {
+    double middle[3] = {0, 0, 0};
+    for (int k = 0; k < 3; ++k) {
+        const double *p = builder_position(b, v[k]);
+        for (int x = 0; x < 3 && p != NULL; ++x) middle[x] += p[x] / 3;
+    }
+    const uint32_t centre = builder_vertex(b, middle[0], middle[1], middle[2]);
+    for (int k = 0; k < 3; ++k) builder_quad(b, centre, m[(k + 2) % 3], v[k], m[k]);
+}
+
+/* middles: 3 a cell: along i, along j, and across. */
+static void add_cell(mesh_builder *b, uint32_t around, uint32_t tube, uint32_t i, uint32_t j, bool falling,
+                     uint32_t *middles) {
     const uint32_t next = (i + 1) % around, up = (j + 1) % tube;
-    const uint32_t quad[4] = {i * tube + j, next * tube + j, next * tube + up, i * tube + up};
-    const uint32_t first[2][3] = {{quad[0], quad[1], quad[2]}, {quad[0], quad[1], quad[3]}};
-    const uint32_t second[2][3] = {{quad[0], quad[2], quad[3]}, {quad[1], quad[2], quad[3]}};
-    builder_face(b, 3, first[falling]);
-    builder_face(b, 3, second[falling]);
+    const uint32_t v00 = i * tube + j, v10 = next * tube + j, v11 = next * tube + up, v01 = i * tube + up;
+    const size_t cell = 3 * (size_t)v00;
+    const uint32_t low = middle_vertex(b, middles, cell, v00, v10);
+    const uint32_t left = middle_vertex(b, middles, cell + 1, v00, v01);
+    const uint32_t high = middle_vertex(b, middles, 3 * (size_t)v01, v01, v11);
+    const uint32_t right = middle_vertex(b, middles, 3 * (size_t)v10 + 1, v10, v11);
+    const uint32_t across = falling ? middle_vertex(b, middles, cell + 2, v10, v01)
+                                    : middle_vertex(b, middles, cell + 2, v00, v11);
+    if (falling) {
+        add_thirds(b, (const uint32_t[]){v00, v10, v01}, (const uint32_t[]){low, across, left});
+        add_thirds(b, (const uint32_t[]){v10, v11, v01}, (const uint32_t[]){right, high, across});
+    } else {
+        add_thirds(b, (const uint32_t[]){v00, v10, v11}, (const uint32_t[]){low, right, across});
+        add_thirds(b, (const uint32_t[]){v00, v11, v01}, (const uint32_t[]){across, high, left});
+    }
 }
 
 static qp_status generate_irregular(mesh_builder *b, const qp_generate_options *options, qp_error *err) {
@@ -149,15 +182,22 @@ static qp_status generate_irregular(mesh_builder *b, const qp_generate_options *
     qp_status status = torus_vertices(b, options, &around, &tube, err);
     qp_random random = {options->seed};
     if (status != QP_OK) return status;
-    if ((uint64_t)around * tube > 100000000) return qp_fail(err, QP_BAD_INPUT, "irregular: more than 10^8 cells");
+    if ((uint64_t)around * tube > 100000000)
+        return qp_fail(err, QP_BAD_INPUT, "irregular: more than 10^8 cells");
+    const size_t edges = 3 * (size_t)around * tube;
+    uint32_t *middles = qp_alloc(edges, sizeof *middles, false);
+    if (middles == NULL) return qp_fail_memory(err, edges * sizeof *middles, "a torus");
+    memset(middles, 0xff, edges * sizeof *middles);
     for (uint32_t i = 0; i < around; i += TILE) {
         for (uint32_t j = 0; j < tube; j += TILE) {
-            const uint32_t end_i = around - i < TILE ? around : i + TILE, end_j = tube - j < TILE ? tube : j + TILE;
+            const uint32_t end_i = around - i < TILE ? around : i + TILE,
+                           end_j = tube - j < TILE ? tube : j + TILE;
             for (uint32_t x = i; x < end_i; ++x)
                 for (uint32_t y = j; y < end_j; ++y)
-                    add_triangles(b, around, tube, x, y, qp_random_below(&random, 2) != 0);
+                    add_cell(b, around, tube, x, y, qp_random_below(&random, 2) != 0, middles);
         }
     }
+    free(middles);
     return QP_OK;
 }
 
@@ -242,10 +282,13 @@ qp_status qp_mesh_generate(const char *kind, const qp_generate_options *options,
     static const struct {
         const char *kind;
         qp_status (*fill)(mesh_builder *, const qp_generate_options *, qp_error *);
-    } fixed[] = {
-        {"cube", generate_cube},   {"torus", generate_torus}, {"creased-torus", generate_creased_torus},
-        {"cubes", generate_cubes}, {"fan", generate_fan},     {"prism", generate_prism},
-        {"irregular", generate_irregular}};
+    } fixed[] = {{"cube", generate_cube},
+                 {"torus", generate_torus},
+                 {"creased-torus", generate_creased_torus},
+                 {"cubes", generate_cubes},
+                 {"fan", generate_fan},
+                 {"prism", generate_prism},
+                 {"irregular", generate_irregular}};
     static const qp_generate_options defaults = {.sharpness = -1};
     *mesh = NULL;
     if (options == NULL) options = &defaults;

@@ -120,7 +120,7 @@ typedef struct qp_generate_options {
 } qp_generate_options;
 
 /* kind: cube, torus, creased-torus, cubes (12 x 12 x 10 grid of separate cubes), fan (valence n[0]), prism
- * (n-gon), terrain, irregular (triangles only), random-closed, random-open. QP_BAD_INPUT names an unknown kind. */
+ * (n-gon), terrain, irregular (no regular patch), random-closed, random-open. QP_BAD_INPUT names an unknown kind. */
 qp_status qp_mesh_generate(const char *kind, const qp_generate_options *options, qp_mesh **mesh,
                            qp_error *err);
 
