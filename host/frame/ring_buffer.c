@@ -82,7 +82,8 @@ qp_status qp_ring_reserve(qp_frame *frame, qp_error *err) {
         qp_buffer_reserve(frame->device, &ring->words, bytes, "the ring buffer's records", err);
     if (status != QP_OK) return status;
     status = qp_buffer_reserve(frame->device, &ring->points,
-                               ((size_t)ring->capacity + 2 * QP_RB_MARGIN) * point_bytes(frame), "the ring buffer", err);
+                               ((size_t)ring->capacity + 2 * QP_RB_MARGIN) * point_bytes(frame),
+                               "the ring buffer", err);
     return status == QP_OK && qp_frame_is_streamed(frame) ? qp_streamed_plan(frame, err) : status;
 }
 
