@@ -148,6 +148,13 @@ check "not watertight: one line" one_line
 check "not watertight: names a place" grep -qE 'patch [0-9]+ \(' "$work/stderr"
 value 'o["position_mismatches"] > 0 and o["normal_mismatches"] > 0 and 0 < o["worst_ulp"] < 100'
 
+run render "$QUADPLAN_SOURCE_DIR/scenes/passes.json" --passes --size 48x32 --device host --supports cache --json \
+    -o "$work/view.png"
+check "render --passes" [ "$code" -eq 0 ]
+check "render --passes: three pictures" [ -s "$work/view.png" -a -s "$work/view-2.png" -a -s "$work/view-3.png" ]
+value '[p["name"] for p in o["passes"]] == ["shadow", "mirror"]'
+value 'o["supports"]["hits"] > 0 and all(p["supports"]["points_computed"] == 0 and p["samples"] > 0 for p in o["passes"])'
+
 run render "$scene" --size 96x64 --tess 4 --json -o "$work/picture.png"
 check "render" [ "$code" -eq 0 ]
 keys render scene picture width height patches samples triangles frame_ms stream_hash device gl
