@@ -180,11 +180,17 @@ static void test_supports(qp_device *device) {
     const qp_tessellation tess = {.factor = 9};
     if (CHECK_OK(qp_mesh_generate("irregular", &generate, &mesh, &err), err) &&
         CHECK_OK(qp_surface_create(mesh, NULL, &surface, &err), err)) {
-        for (int kind = QP_SUPPORTS_SCRATCH; kind <= QP_SUPPORTS_RING; ++kind) {
-            const qp_frame_options options = {
-                .want_hash = 1,
-                .supports = {.kind = (qp_supports_kind)kind, .ring_bytes = 1 << 16, .canaries = 1}};
-            check_case(device, surface, &options, &tess, kind == QP_SUPPORTS_RING ? "a ring" : "scratch");
+        static const qp_supports_options kinds[] = {
+            {.kind = QP_SUPPORTS_SCRATCH},
+            {.kind = QP_SUPPORTS_RING, .ring_bytes = 1 << 16, .canaries = 1},
+            {.kind = QP_SUPPORTS_RING, .ring_bytes = 1 << 16, .schedule = QP_SCHEDULE_STREAMED},
+            {.kind = QP_SUPPORTS_CACHE},
+            {.kind = QP_SUPPORTS_CACHE, .cache_policy = QP_CACHE_CLOCK, .cache_bytes = 1 << 16}};
+        for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; ++i) {
+            char what[40];
+            const qp_frame_options options = {.want_hash = 1, .supports = kinds[i]};
+            snprintf(what, sizeof what, "supports %zu", i);
+            check_case(device, surface, &options, &tess, what);
         }
     }
     qp_surface_free(surface);
