@@ -53,6 +53,7 @@ static qp_status measure(qp_frame *const *frames, float factor, int repeat, qp_e
                (double)factor, variants[v].name, ms, ms / wall0, all, all / processor0, r->capacity_bytes,
                r->peak_bytes, r->stalls, r->stall_ms, r->wraps);
     }
+    fflush(stdout);
     return QP_OK;
 }
 
