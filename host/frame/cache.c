@@ -162,6 +162,8 @@ qp_status qp_cache_begin(qp_frame *frame, qp_error *err) {
 
 qp_status qp_cache_launch(qp_frame *frame, const qp_frame_batch *batch, double *ms, qp_error *err) {
     const qp_cache *c = &frame->cache;
+    if (batch->points > INT32_MAX) /* or a place's version might come round during a launch */
+        return qp_fail(err, QP_SYSTEM, "a cache takes no more than 2^31 control points a launch");
     const qp_arg args[] = {{&frame->heads, 0},
                            {&frame->trees, 0},
                            {&frame->reals, 0},
