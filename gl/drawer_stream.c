@@ -25,11 +25,6 @@ typedef struct stream_drawer {
     bool points_sent;
 } stream_drawer;
 
-static float component(const qp_stream *stream, size_t sample, size_t k) {
-    return stream->precision == QP_DOUBLE ? (float)((const double *)stream->vertices)[6 * sample + k]
-                                          : ((const float *)stream->vertices)[6 * sample + k];
-}
-
 static void fill_corners(const qp_drawn *in, uint64_t first, uint64_t count, corner *corners) {
     for (uint64_t t = first; t < first + count; t++) {
         const uint32_t *triangle = in->stream->triangles + 3 * t;
@@ -40,7 +35,7 @@ static void fill_corners(const qp_drawn *in, uint64_t first, uint64_t count, cor
         for (int c = 0; c < 3; c++, corners++) {
             size_t sample = triangle[c];
             memcpy(corners->position, in->positions + 3 * sample, sizeof corners->position);
-            for (size_t k = 0; k < 3; k++) corners->normal[k] = component(in->stream, sample, 3 + k);
+            for (size_t k = 0; k < 3; k++) corners->normal[k] = qp_drawn_number(in->stream, sample, 3 + k);
             memcpy(corners->uv, in->stream->uv + 2 * sample, sizeof corners->uv);
             memcpy(corners->colour, bytes, sizeof bytes);
         }

@@ -16,6 +16,12 @@ typedef struct qp_drawn {
     const uint32_t *components; /* of each patch, where the scene colours by them */
 } qp_drawn;
 
+/* Number k of a sample (position, then normal), as GL takes it. */
+static inline float qp_drawn_number(const qp_stream *stream, size_t sample, size_t k) {
+    return stream->precision == QP_DOUBLE ? (float)((const double *)stream->vertices)[6 * sample + k]
+                                          : ((const float *)stream->vertices)[6 * sample + k];
+}
+
 /* Triangles of the vertex stream. */
 qp_status qp_drawer_stream(qp_gl *gl, const qp_drawn *drawn, qp_drawer **drawer, qp_error *err);
 /* GL's own tessellator and shaders (tessellation.h). */

@@ -7,11 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static float component(const qp_stream *stream, size_t sample, size_t k) {
-    return stream->precision == QP_DOUBLE ? (float)((const double *)stream->vertices)[6 * sample + k]
-                                          : ((const float *)stream->vertices)[6 * sample + k];
-}
-
 /* What the shaders and the palette index must be there. */
 static qp_status check_stream(const qp_surface *surface, const qp_stream *stream, qp_error *err) {
     if (stream->n_samples == 0 || stream->n_triangles == 0)
@@ -36,7 +31,7 @@ static qp_status take_positions(const qp_stream *stream, float **positions, qp_e
     if (*positions == NULL) return qp_fail_memory(err, n * 3 * sizeof(float), "positions");
     for (uint64_t i = 0; i < n; i++)
         for (size_t k = 0; k < 3; k++) {
-            float x = component(stream, i, k);
+            float x = qp_drawn_number(stream, i, k);
             if (!isfinite(x))
                 return qp_fail(err, QP_CHECK_FAILED, "sample %llu on patch %u is not finite",
                                (unsigned long long)i, stream->sample_patch[i]);

@@ -164,19 +164,10 @@ qp_status qp_cache_launch(qp_frame *frame, const qp_frame_batch *batch, double *
     const qp_cache *c = &frame->cache;
     if (batch->points > INT32_MAX) /* or a place's version might come round during a launch */
         return qp_fail(err, QP_SYSTEM, "a cache takes no more than 2^31 control points a launch");
-    const qp_arg args[] = {{&frame->heads, 0},
-                           {&frame->trees, 0},
-                           {&frame->reals, 0},
-                           {&frame->rings, 0},
-                           {&frame->positions, 0},
-                           {&frame->entries, 0},
-                           {NULL, batch->first_general},
-                           {&c->numbers, 0},
-                           {&c->control, 0},
-                           {&c->tags, 0},
-                           {&c->points, 0},
-                           {&c->seen, 0},
-                           {&frame->support, 0}};
+    const qp_arg args[] = {QP_ARGS_PLANS(frame), {NULL, batch->first_general},
+                           {&c->numbers, 0},     {&c->control, 0},
+                           {&c->tags, 0},        {&c->points, 0},
+                           {&c->seen, 0},        {&frame->support, 0}};
     return qp_launch(frame->device, &frame->program, QP_KERNEL_CACHED_HULL, args,
                      sizeof args / sizeof args[0], batch->n_general, ms, err);
 }

@@ -101,7 +101,6 @@ void qp_frame_free(qp_frame *frame) {
 
 /* Starts the kernels of every batch. */
 static qp_status launch_batches(qp_frame *frame, double *hull_ms, double *domain_ms, qp_error *err) {
-    const uint32_t want = frame->options.want_derivatives != 0;
     const bool has_ring = qp_frame_has_ring(frame), cached = qp_frame_is_cached(frame);
     qp_status status = has_ring ? qp_ring_reset(frame, err) : cached ? qp_cache_begin(frame, err) : QP_OK;
     for (size_t b = 0; b < frame->n_batches && status == QP_OK; ++b) {
@@ -109,21 +108,11 @@ static qp_status launch_batches(qp_frame *frame, double *hull_ms, double *domain
         status = qp_buffer_unmap(frame->device, &batch->vertices, err);
         if (status == QP_OK) status = qp_buffer_unmap(frame->device, &batch->flags, err);
         if (status == QP_OK) status = qp_buffer_unmap(frame->device, &batch->derivatives, err);
-        /* Any buffer will do where none is written. */
-        const qp_buffer *derivatives = want != 0 ? &batch->derivatives : &batch->vertices;
-        const qp_arg hull[] = {{&frame->heads, 0},   {&frame->trees, 0},     {&frame->reals, 0},
-                               {&frame->rings, 0},   {&frame->positions, 0}, {&frame->entries, 0},
-                               {NULL, batch->first_general}, {&frame->support, 0}};
-        const qp_arg domain[] = {
-            {&frame->heads, 0},     {&frame->trees, 0},   {&frame->reals, 0},           {&frame->rings, 0},
-            {&frame->positions, 0}, {&frame->entries, 0}, {NULL, batch->first_general}, {&frame->support, 0},
-            {&frame->grid_u, 0},    {&frame->grid_v, 0},  {&batch->vertices, 0},        {&batch->flags, 0},
-            {derivatives, 0},       {NULL, want}};
-        const qp_arg regular[] = {{&frame->rings, 0},    {&frame->positions, 0},
-                                  {&frame->entries, 0},  {NULL, batch->first_regular},
-                                  {&frame->grid_u, 0},   {&frame->grid_v, 0},
-                                  {&batch->vertices, 0}, {&batch->flags, 0},
-                                  {derivatives, 0},      {NULL, want}};
+        const qp_arg hull[] = {QP_ARGS_PLANS(frame), {NULL, batch->first_general}, {&frame->support, 0}};
+        const qp_arg domain[] = {QP_ARGS_PLANS(frame), {NULL, batch->first_general}, {&frame->support, 0},
+                                 QP_ARGS_SAMPLES(frame, batch)};
+        const qp_arg regular[] = {{&frame->rings, 0}, {&frame->positions, 0}, {&frame->entries, 0},
+                                  {NULL, batch->first_regular}, QP_ARGS_SAMPLES(frame, batch)};
         if (status == QP_OK && has_ring) status = qp_ring_launch(frame, b, hull_ms, domain_ms, err);
         if (status == QP_OK && cached) status = qp_cache_launch(frame, batch, hull_ms, err);
         if (status == QP_OK && !has_ring && !cached)

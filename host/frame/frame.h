@@ -69,6 +69,19 @@ struct qp_frame {
     size_t ordered_bytes;
 };
 
+/* clang-format off */
+/* What the arguments of every kernel for general patches begin with: plans, base vertices, entries. */
+#define QP_ARGS_PLANS(frame)                                                                                 \
+    {&(frame)->heads, 0}, {&(frame)->trees, 0}, {&(frame)->reals, 0}, {&(frame)->rings, 0},                  \
+    {&(frame)->positions, 0}, {&(frame)->entries, 0}
+/* What those of every kernel that makes samples end with: grids, and where a batch's samples go. Any buffer will do for derivatives
+ * that are not written. */
+#define QP_ARGS_SAMPLES(frame, batch)                                                                        \
+    {&(frame)->grid_u, 0}, {&(frame)->grid_v, 0}, {&(batch)->vertices, 0}, {&(batch)->flags, 0},             \
+    {(frame)->options.want_derivatives ? &(batch)->derivatives : &(batch)->vertices, 0},                     \
+    {NULL, (frame)->options.want_derivatives != 0}
+/* clang-format on */
+
 /* How a patch of the layout is evaluated: its plan, its index in heads, and where its 1-ring begins in rings. */
 typedef struct qp_frame_plan {
     const qp_plan *plan;

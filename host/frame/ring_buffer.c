@@ -130,26 +130,13 @@ qp_status qp_ring_reset(qp_frame *frame, qp_error *err) {
 qp_status qp_ring_launch(qp_frame *frame, size_t b, double *hull_ms, double *domain_ms, qp_error *err) {
     if (qp_frame_is_streamed(frame)) return qp_streamed_launch_batch(frame, b, hull_ms, domain_ms, err);
     const qp_frame_batch *batch = &frame->batches[b];
-    const uint32_t want = frame->options.want_derivatives != 0;
     uint32_t first_ticket = 0;
     for (size_t i = 0; i < b; ++i) first_ticket += frame->batches[i].n_general;
-    /* Any buffer will do where no derivatives are written. */
-    const qp_buffer *derivatives = want != 0 ? &batch->derivatives : &batch->vertices;
-    const qp_arg args[] = {{&frame->heads, 0},
-                           {&frame->trees, 0},
-                           {&frame->reals, 0},
-                           {&frame->rings, 0},
-                           {&frame->positions, 0},
-                           {&frame->entries, 0},
+    const qp_arg args[] = {QP_ARGS_PLANS(frame),
                            {NULL, batch->first_general - first_ticket},
                            {&frame->ring.words, 0},
                            {&frame->ring.points, 0},
-                           {&frame->grid_u, 0},
-                           {&frame->grid_v, 0},
-                           {&batch->vertices, 0},
-                           {&batch->flags, 0},
-                           {derivatives, 0},
-                           {NULL, want}};
+                           QP_ARGS_SAMPLES(frame, batch)};
     return qp_launch(frame->device, &frame->program, QP_KERNEL_FUSED, args, sizeof args / sizeof args[0],
                      batch->n_general, domain_ms, err);
 }

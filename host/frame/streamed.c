@@ -127,10 +127,8 @@ static qp_status fill(qp_frame *frame, qp_streamed_launch *launch, double *ms, q
     if (after == NULL) return qp_fail_memory(err, launch->credits * sizeof *after, "a launch");
     for (uint32_t i = 0; i < launch->credits; ++i)
         after[i] = &s->launches[s->credits[launch->first_credit + i]].domain;
-    const qp_arg args[] = {{&frame->heads, 0},          {&frame->trees, 0},           {&frame->reals, 0},
-                           {&frame->rings, 0},          {&frame->positions, 0},       {&frame->entries, 0},
-                           {NULL, launch->first_entry}, {NULL, launch->first_ticket}, {NULL, launch->offset},
-                           {&frame->ring.words, 0},     {&frame->ring.points, 0}};
+    const qp_arg args[] = {QP_ARGS_PLANS(frame),   {NULL, launch->first_entry}, {NULL, launch->first_ticket},
+                           {NULL, launch->offset}, {&frame->ring.words, 0},     {&frame->ring.points, 0}};
     const qp_turn turn = {.queue = 0, .after = after, .n_after = launch->credits, .event = &launch->hull};
     qp_status status = qp_launch_in_turn(frame->device, &frame->program, QP_KERNEL_STREAM_HULL, args,
                                          sizeof args / sizeof args[0], launch->patches, &turn, ms, err);
@@ -144,24 +142,9 @@ static qp_status drain(qp_frame *frame, size_t k, double *ms, qp_error *err) {
     if (launch->drained) return QP_OK;
     launch->drained = true;
     const qp_frame_batch *batch = &frame->batches[launch->batch];
-    const uint32_t want = frame->options.want_derivatives != 0;
-    const qp_arg args[] = {{&frame->heads, 0},
-                           {&frame->trees, 0},
-                           {&frame->reals, 0},
-                           {&frame->rings, 0},
-                           {&frame->positions, 0},
-                           {&frame->entries, 0},
-                           {NULL, launch->first_entry},
-                           {NULL, launch->first_ticket},
-                           {&frame->ring.words, 0},
-                           {&frame->ring.points, 0},
-                           {&frame->grid_u, 0},
-                           {&frame->grid_v, 0},
-                           {&batch->vertices, 0},
-                           {&batch->flags, 0},
-                           /* Any buffer will do where no derivatives are written. */
-                           {want != 0 ? &batch->derivatives : &batch->vertices, 0},
-                           {NULL, want}};
+    const qp_arg args[] = {QP_ARGS_PLANS(frame),         {NULL, launch->first_entry},
+                           {NULL, launch->first_ticket}, {&frame->ring.words, 0},
+                           {&frame->ring.points, 0},     QP_ARGS_SAMPLES(frame, batch)};
     const bool in_order = frame->options.supports.retirement == QP_RETIRE_IN_ORDER;
     const qp_event *after = &launch->hull;
     const qp_turn turn = {.queue = in_order ? 1 : 1 + (unsigned)(k % 2),
